@@ -14,7 +14,7 @@ TEST(CrossingPlanes, AWallStaysOneWhereASupportPlaneWouldPassThroughIt) {
   constexpr float kTableEnds = 1.8f;
   Room room;
   const auto isTable = [](int v) {
-    return static_cast<float>(camera().ray(0, v).y()) * kTableEnds >= 1.0f;
+    return static_cast<float>(roomCamera().ray(0, v).y()) * kTableEnds >= 1.0f;
   };
   for (int v = 0; v < kHigh; ++v) {
     if (isTable(v)) continue;

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
+#include "frame/plane_light.hpp"
 #include "place/place_view.hpp"
 #include "place/plane_reach.hpp"
 #include "place/relief_sky.hpp"
@@ -21,7 +22,7 @@ TEST(PlaceRelief, AWallGoesOnBehindAnObjectAndMeetsTheFloorThere) {
   const PlaceSurfaces surfaces = Room().surfaces();
   for (int v = 0; v < kHigh; ++v) {
     for (int u = 0; u < kWide; ++u) {
-      const double edge = std::abs(camera().ray(u, v).y() * kWallAway - 1.0);
+      const double edge = std::abs(roomCamera().ray(u, v).y() * kWallAway - 1.0);
       if (edge < 0.01) continue;
       ASSERT_EQ(surfaces.label.at<std::uint8_t>(v, u), isWall(v) ? 2 : 1) << u << ", " << v;
     }
@@ -37,7 +38,7 @@ TEST(PlaceRelief, TheSidesOfABlockEndAtItsEdge) {
   Room room;
   const auto isTop = [](double down) { return down * 1.702 < 0.5; };
   for (int v = 0; v < kHigh; ++v) {
-    const double down = camera().ray(0, v).y();
+    const double down = roomCamera().ray(0, v).y();
     const double front = 1.702, top = 0.5 / std::max(down, 1e-6);
     if (top > 3.0) continue;  // the wall behind
     const double near = isTop(down) ? top : std::min(front, 1.0 / down);
@@ -64,7 +65,7 @@ TEST(PlaceRelief, TheSidesOfABlockEndAtItsEdge) {
 TEST(PlaceRelief, AFloorUpToTheHorizonIsNoPlaneOfItsOwn) {
   Room room;
   for (int v = 0; v < kHigh; ++v) {
-    const float down = std::max(0.0f, static_cast<float>(camera().ray(0, v).y()));
+    const float down = std::max(0.0f, static_cast<float>(roomCamera().ray(0, v).y()));
     room.scenery.row(v) = down, room.depth.row(v) = down > 0.0f ? 1.0f / down : 0.0f;
   }
   cv::erode(room.scenery, room.scenery, cv::Mat::ones(3, 3, CV_8U));
@@ -78,7 +79,7 @@ TEST(PlaceRelief, AFloorUpToTheHorizonIsNoPlaneOfItsOwn) {
 TEST(PlaceRelief, AFloorUpToTheHorizonGoesOnBehindAnObject) {
   Room room;
   for (int v = 0; v < kHigh; ++v) {
-    const float down = std::max(0.0f, static_cast<float>(camera().ray(0, v).y()));
+    const float down = std::max(0.0f, static_cast<float>(roomCamera().ray(0, v).y()));
     room.scenery.row(v) = down, room.depth.row(v) = down > 0.0f ? 1.0f / down : 0.0f;
   }
   cv::erode(room.scenery, room.scenery, cv::Mat::ones(3, 3, CV_8U));
@@ -105,7 +106,7 @@ TEST(PlaceRelief, APlaneIsLeftToWhatRisesAboveIt) {
   Room room;
   for (int v = 0; v < kHigh; ++v) {
     for (int u = 0; u < kWide; ++u) {
-      const float floor = std::max(0.05f, static_cast<float>(camera().ray(0, v).y()));
+      const float floor = std::max(0.05f, static_cast<float>(roomCamera().ray(0, v).y()));
       const float x = static_cast<float>(std::max(0, u - 90)) / 40.0f;
       const float bumps = 1.0f + 0.3f * std::sin(0.5f * v) * std::sin(0.4f * u);
       room.scenery.at<float>(v, u) = floor + 0.3f * x * x * bumps;
@@ -146,7 +147,7 @@ TEST(PlaceRelief, APlaneIsNotSeenWithinWhatStandsOnIt) {
   const cv::Rect bowl(50, 70, 60, 36), object(54, 74, 52, 28);
   for (int v = bowl.y; v < bowl.br().y; ++v) {
     for (int u = bowl.x; u < bowl.br().x; ++u)
-      room.scenery.at<float>(v, u) = static_cast<float>(camera().ray(0, v).y()) + 0.12f +
+      room.scenery.at<float>(v, u) = static_cast<float>(roomCamera().ray(0, v).y()) + 0.12f +
                                      0.08f * std::sin(0.9f * v) * std::sin(0.8f * u);
   }
   room.depth = 1.0f / room.scenery;
@@ -164,7 +165,7 @@ TEST(PlaceRelief, APlaneGoesOnBehindAnObjectThatABushStandsBefore) {
     for (int u = 0; u < kWide; ++u) {
       room.scenery.at<float>(v, u) =
           bush.contains({u, v}) ? 0.4f + 0.04f * std::sin(0.9f * v) * std::sin(0.8f * u)
-                                : std::max(0.02f, static_cast<float>(camera().ray(0, v).y()));
+                                : std::max(0.02f, static_cast<float>(roomCamera().ray(0, v).y()));
     }
   }
   room.depth = 1.0f / room.scenery, room.labels.setTo(0);
@@ -184,7 +185,7 @@ TEST(PlaceRelief, ASupportPlaneIsNotSeenBeyondItsEnds) {
   planes.push_back(planes.front());
   planes.back().offset = 0.4, planes.back().x_range = Eigen::Vector2d(-0.3, 0.3);
   const PlaceSurfaces surfaces =
-      findSurfaces(room.scenery, room.depth, room.labels, planes, camera());
+      findSurfaces(room.scenery, room.depth, room.labels, planes, roomCamera());
   EXPECT_EQ(cv::countNonZero(surfaces.label == 2), 0);
 }
 
@@ -203,7 +204,8 @@ TEST(PlaneReach, WhatMeetsAPlaneThatGoesOnDoesSoAsWell) {
 
 TEST(PlaceRelief, IsNoneWhereNothingStandsAndWhereWhatIsCurvedTurnsAway) {
   EXPECT_TRUE(
-      findRelief(findSurfaces(cv::Mat(), cv::Mat(), Room().labels, floorPlane(), camera()), kSun)
+      findRelief(findSurfaces(cv::Mat(), cv::Mat(), Room().labels, floorPlane(), roomCamera()),
+                 kSun)
           .empty());
   PlaceSurfaces surfaces = Room().surfaces();
   surfaces.label.setTo(PlaceSurfaces::kCurved, surfaces.label == 2);
@@ -323,7 +325,7 @@ TEST(ReliefSky, IsHiddenFromAWallByWhatIsNearItAlone) {
 
 TEST(PlaceView, SeesTheReliefBeforeThePlanesBehindIt) {
   const Relief relief = findRelief(Room().surfaces(), kSun);
-  const PlaceView view(PlaneView(floorPlane(), camera()), relief);
+  const PlaceView view(PlaneView(floorPlane(), roomCamera()), relief);
   Receiver r;
   ASSERT_TRUE(view.at(20.0f, 70.0f, r));  // the floor goes on behind the wall
   EXPECT_NEAR(r.position.y(), kWallAway, 1e-3);
@@ -334,6 +336,56 @@ TEST(PlaceView, SeesTheReliefBeforeThePlanesBehindIt) {
   EXPECT_EQ(row[20], 255);  // above the horizon of the floor
   EXPECT_TRUE(relief.touches(0, 0, 16));
   EXPECT_FALSE(relief.touches(0, 112, 8));
+}
+
+// A light that ends within a micrometre at a plane across floor and wall.
+class HalfLight : public Visibility {
+ public:
+  float visibility(const Eigen::Vector3f& p, const Eigen::Vector3f&) const override {
+    return std::clamp(0.5f + 1e6f * inside(p), 0.0f, 1.0f);
+  }
+  bool empty() const override { return false; }
+  std::optional<float> uniform(const Eigen::Vector3f& p, const Eigen::Vector3f&,
+                               float radius) const override {
+    if (std::abs(inside(p)) <= radius) return std::nullopt;
+    return inside(p) > 0.0f ? 1.0f : 0.0f;
+  }
+
+ private:
+  static float inside(const Eigen::Vector3f& p) {
+    return p.dot(Eigen::Vector3f(1.0f, 0.3f, 0.4f).normalized()) - 1.076f;
+  }
+};
+
+// Pixels of a wall that a sharp shadow's border crosses are shaded in part, as those of planes, and
+// are the same whatever part of the picture is asked for.
+TEST(PlanesInLight, IsAsSoftAsAPixelOffThePlanes) {
+  const PlaceView view(PlaneView(floorPlane(), roomCamera()), findRelief(Room().surfaces(), kSun));
+  const HalfLight light;
+  const auto levelsIn = [&](const cv::Rect& rect) {
+    cv::Mat levels(rect.size(), CV_8U, cv::Scalar(255));
+    planesInLight(view, light, rect, SquareMask(), levels);
+    return levels;
+  };
+  const cv::Rect wall(3, 5, 150, 60), part(61, 13, 50, 41);
+  const cv::Mat levels = levelsIn(wall);
+  int in_part = 0;
+  for (int v = wall.y; v < wall.br().y; ++v) {
+    for (int u = wall.x; u < wall.br().x; ++u) {
+      float seen = 0.0f;
+      for (int k = 0; k < 4; ++k) {
+        const Eigen::Vector3f ray =
+            roomCamera().ray(u - 0.5f + (k & 1), v - 0.5f + (k >> 1)).cast<float>();
+        const Eigen::Vector3f at(kWallAway * ray.x(), kWallAway, 1.0f - kWallAway * ray.y());
+        seen += 0.25f * light.visibility(at, {});
+      }
+      const int level = levels.at<std::uint8_t>(v - wall.y, u - wall.x);
+      ASSERT_NEAR(level, 255.0f * seen, 1.0f) << u << ", " << v;
+      in_part += level > 0 && level < 255;
+    }
+  }
+  EXPECT_GE(in_part, wall.height);
+  EXPECT_EQ(cv::norm(levelsIn(part), levels(part - wall.tl()), cv::NORM_INF), 0.0);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ const cv::Rect kObject(60, 40, 40, 60);  // across the edge between floor and wa
 constexpr float kObjectAway = 2.0f;
 
 // 1 m over the floor z = 0, looking along y.
-inline Camera camera() {
+inline Camera roomCamera() {
   Camera c;
   c.width = kWide, c.height = kHigh, c.fx = c.fy = 120.0, c.cx = 79.5, c.cy = 59.5;
   Eigen::Matrix3d R;
@@ -31,7 +31,9 @@ inline std::vector<SupportPlane> floorPlane() {
   return {plane};
 }
 
-inline bool isWall(int v) { return static_cast<float>(camera().ray(0, v).y()) * kWallAway < 1.0f; }
+inline bool isWall(int v) {
+  return static_cast<float>(roomCamera().ray(0, v).y()) * kWallAway < 1.0f;
+}
 
 struct Room {
   cv::Mat depth = cv::Mat(kHigh, kWide, CV_32F), scenery = depth.clone(),
@@ -39,14 +41,14 @@ struct Room {
 
   Room() {
     for (int v = 0; v < kHigh; ++v) {
-      const float floor = 1.0f / std::max(1e-6f, static_cast<float>(camera().ray(0, v).y()));
+      const float floor = 1.0f / std::max(1e-6f, static_cast<float>(roomCamera().ray(0, v).y()));
       depth.row(v) = isWall(v) ? kWallAway : floor;
     }
     scenery = 1.0f / depth;
     depth(kObject) = kObjectAway, scenery(kObject) = 0.0f, labels(kObject) = 1;
   }
   PlaceSurfaces surfaces() const {
-    return findSurfaces(scenery, depth, labels, floorPlane(), camera());
+    return findSurfaces(scenery, depth, labels, floorPlane(), roomCamera());
   }
 };
 

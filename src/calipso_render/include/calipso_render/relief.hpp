@@ -34,6 +34,8 @@ struct Relief {
   // Is any of it seen in the square that begins at (u, v)? @pre u, v and size are multiples of
   // kTile
   bool touches(int u, int v, int size) const;
+  // Does every pixel of a part of the picture see the same wall?
+  bool isOneWall(const cv::Rect& part) const;
   // Fills tiles, box and walls from what is seen.
   void index();
 };

@@ -20,6 +20,7 @@ constexpr float kCorner = -0.5f;  // px from a pixel to its first corner
 constexpr float kEven = 0.05f;
 // of visibility: between places that differ by no more it is interpolated
 constexpr float kSlow = 0.3f;
+constexpr float kUnseen = -1.0f;  // visibility of a light where nothing takes its shadows
 
 class Squares {
  public:
@@ -42,19 +43,11 @@ class Squares {
   void fill(const cv::Rect& square) const {
     const cv::Rect here = (square & rect_) - rect_.tl();
     if (here.empty() || skip_.all(square & rect_)) return;
-    Receiver middle, corner;
-    bool even = !view_.relief().touches(square.x, square.y, square.width) &&
-                view_.at(square.x + kCorner + 0.5f * square.width,
-                         square.y + kCorner + 0.5f * square.height, middle);
-    float radius = 0.0f;
-    for (int k = 0; k < 4 && even; ++k) {
-      even = view_.at(square.x + kCorner + (k & 1) * square.width,
-                      square.y + kCorner + (k >> 1) * square.height, corner) &&
-             corner.normal == middle.normal;
-      radius = std::max(radius, (corner.position - middle.position).norm());
-    }
+    const bool off_planes = view_.relief().touches(square.x, square.y, square.width);
+    const std::optional<Disc> disc = off_planes ? wallDisc(square) : planeDisc(square);
     const std::optional<float> uniform =
-        even ? light_.uniform(middle.position, middle.normal, radius) : std::nullopt;
+        disc ? light_.uniform(disc->middle.position, disc->middle.normal, disc->radius)
+             : std::nullopt;
     const bool split = !uniform && square.width > kSquare;
     if (shaded_ != nullptr && !split && uniform != 1.0f) shaded_->set(here + rect_.tl());
     if (uniform) {
@@ -64,11 +57,47 @@ class Squares {
       const int half = square.width / 2;
       for (int k = 0; k < 4; ++k)
         fill({square.x + (k & 1) * half, square.y + (k >> 1) * half, half, half});
-    } else if (even) {
+    } else if (disc && !off_planes) {
       refine(square, here);
     } else {
       fillExactly(square, here);
     }
+  }
+
+  // What a square sees, if it is plane.
+  struct Disc {
+    Receiver middle;
+    float radius;  // m, to its farthest corner
+  };
+
+  template <typename At>
+  static std::optional<Disc> discOf(const cv::Rect& square, const Receiver& middle, At at) {
+    Disc disc{middle, 0.0f};
+    for (int k = 0; k < 4; ++k) {
+      Receiver corner = middle;
+      if (!at(square.x + kCorner + (k & 1) * square.width,
+              square.y + kCorner + (k >> 1) * square.height, corner) ||
+          corner.normal != middle.normal)
+        return std::nullopt;
+      disc.radius = std::max(disc.radius, (corner.position - middle.position).norm());
+    }
+    return disc;
+  }
+
+  std::optional<Disc> planeDisc(const cv::Rect& square) const {
+    Receiver middle;
+    if (!view_.at(square.x + kCorner + 0.5f * square.width,
+                  square.y + kCorner + 0.5f * square.height, middle))
+      return std::nullopt;
+    return discOf(square, middle,
+                  [this](float u, float v, Receiver& r) { return view_.at(u, v, r); });
+  }
+
+  std::optional<Disc> wallDisc(const cv::Rect& square) const {
+    if (!view_.relief().isOneWall(square)) return std::nullopt;
+    return discOf(
+        square, view_.relief().receiver(square.x + square.width / 2, square.y + square.height / 2),
+        [this](float u, float v, Receiver& r) { return view_.slide(u, v, r); });
   }
 
   // Places looked up at once.
@@ -79,9 +108,13 @@ class Squares {
     void add(float u, float v, float* visible, float otherwise = 1.0f) {
       Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
       *visible = otherwise;
-      if (!squares_.view_.at(u, v, r)) return;
-      out_[batch_.add(r.position, r.normal)] = visible;
-      if (batch_.count() == LightBatch::kMost) look();
+      if (squares_.view_.at(u, v, r)) add(r, visible);
+    }
+    // What pixel (u, v) sees so far beside its centre.
+    void addBeside(int u, int v, float du, float dv, float* visible) {
+      Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
+      *visible = 1.0f;
+      if (squares_.view_.beside(u, v, du, dv, r)) add(r, visible);
     }
     void look() {
       float visible[LightBatch::kMost];
@@ -91,6 +124,11 @@ class Squares {
     }
 
    private:
+    void add(const Receiver& r, float* visible) {
+      out_[batch_.add(r.position, r.normal)] = visible;
+      if (batch_.count() == LightBatch::kMost) look();
+    }
+
     const Squares& squares_;
     LightBatch batch_;
     float* out_[LightBatch::kMost];
@@ -193,18 +231,55 @@ class Squares {
     }
   }
 
-  // Every pixel on its own: the relief, or several planes. What sees neither keeps its value.
+  // What the pixels of a square and those around it see, each on its own.
+  struct Exact {
+    float visible[kSquare + 2][kSquare + 2];  // kUnseen: neither relief nor plane
+
+    // Whether those around the square's pixel (x, y) differ by much.
+    bool bordersShade(int x, int y) const {
+      float low = 1.0f, high = 0.0f;
+      for (int j = y; j < y + 3; ++j) {
+        for (int i = x; i < x + 3; ++i) {
+          if (visible[j][i] == kUnseen) continue;
+          low = std::min(low, visible[j][i]), high = std::max(high, visible[j][i]);
+        }
+      }
+      return high - low > kSlow;
+    }
+  };
+
+  // Every pixel on its own: the relief, or several planes. Those at a shadow's border have the mean
+  // of what their corners see, as on planes. What sees neither keeps its value.
   void fillExactly(const cv::Rect& square, const cv::Rect& here) const {
-    float visible[kSquare][kSquare] = {};
+    const cv::Rect own = here + rect_.tl() - square.tl();  // of the square's pixels
+    Exact exact;
     Lookup lookup(*this);
-    for (int y = here.y; y < here.br().y; ++y) {
-      const std::uint8_t* kept = out_.ptr<std::uint8_t>(y);
-      float* at = &visible[y + rect_.y - square.y][rect_.x - square.x + here.x];
-      for (int x = here.x; x < here.br().x; ++x)
-        lookup.add(static_cast<float>(x + rect_.x), static_cast<float>(y + rect_.y), at++,
-                   kept[x] / 255.0f);
+    for (int y = own.y; y < own.br().y + 2; ++y) {
+      for (int x = own.x; x < own.br().x + 2; ++x)
+        lookup.add(static_cast<float>(square.x + x - 1), static_cast<float>(square.y + y - 1),
+                   &exact.visible[y][x], kUnseen);
     }
     lookup.look();
+    float visible[kSquare][kSquare] = {}, corners[kSquare][kSquare][4];
+    bool mixed[kSquare][kSquare] = {};
+    for (int y = own.y; y < own.br().y; ++y) {
+      const std::uint8_t* kept = out_.ptr<std::uint8_t>(y - own.y + here.y) + here.x - own.x;
+      for (int x = own.x; x < own.br().x; ++x) {
+        const float centre = exact.visible[y + 1][x + 1];
+        visible[y][x] = centre == kUnseen ? kept[x] / 255.0f : centre;
+        mixed[y][x] = centre != kUnseen && exact.bordersShade(x, y);
+        for (int k = 0; k < 4 && mixed[y][x]; ++k)
+          lookup.addBeside(square.x + x, square.y + y, kCorner + (k & 1), kCorner + (k >> 1),
+                           &corners[y][x][k]);
+      }
+    }
+    lookup.look();
+    for (int y = own.y; y < own.br().y; ++y) {
+      for (int x = own.x; x < own.br().x; ++x) {
+        const float* c = corners[y][x];
+        if (mixed[y][x]) visible[y][x] = 0.25f * (c[0] + c[1] + c[2] + c[3]);
+      }
+    }
     write(square, here, visible);
   }
 

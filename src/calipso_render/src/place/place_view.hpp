@@ -38,10 +38,30 @@ class PlaceView {
     return planes_.at(u, v, receiver);
   }
 
+  // What pixel (u, v) sees, less than a pixel beside its centre: relief goes on flat there.
+  bool beside(int u, int v, float du, float dv, Receiver& receiver) const {
+    if (!relief_.at(u, v)) return planes_.at(u + du, v + dv, receiver);
+    receiver = relief_.receiver(u, v);
+    slide(u + du, v + dv, receiver);
+    return true;
+  }
+
+  // Takes a receiver along its plane to where (u, v) sees that.
+  // @return false, and it stays, where the plane is seen too flat to tell
+  bool slide(float u, float v, Receiver& receiver) const {
+    const Eigen::Vector3f ray = planes_.ray(u, v);
+    const float slope = receiver.normal.dot(ray);
+    if (slope >= -kFlat * ray.norm()) return false;
+    receiver.position =
+        planes_.eye() + receiver.normal.dot(receiver.position - planes_.eye()) / slope * ray;
+    return true;
+  }
+
   const PlaneView& planes() const { return planes_; }
   const Relief& relief() const { return relief_; }
 
  private:
+  static constexpr float kFlat = 0.05f;  // cosine of a view that is too flat
   PlaneView planes_;
   Relief relief_;
 };

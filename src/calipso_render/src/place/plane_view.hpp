@@ -24,6 +24,8 @@ class PlaneView {
   void seesRow(int u, int v, int count, std::uint8_t* out) const;
 
   const Eigen::Vector3f& eye() const { return eye_; }
+  // Sight line of a pixel, world; not of unit length.
+  Eigen::Vector3f ray(float u, float v) const { return ray_0_ + u * ray_u_ + v * ray_v_; }
 
   // Of a row's pixels, world.
   SightLines sightLines(int v) const {
@@ -33,7 +35,7 @@ class PlaneView {
 
   // @return false where no plane is seen
   bool at(float u, float v, Receiver& receiver) const {
-    const Eigen::Vector3f ray = ray_0_ + u * ray_u_ + v * ray_v_;
+    const Eigen::Vector3f ray = this->ray(u, v);
     float nearest = 1e30f;
     for (const Plane& plane : planes_) {
       const float slope = plane.normal.dot(ray);

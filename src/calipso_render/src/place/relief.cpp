@@ -24,6 +24,20 @@ bool Relief::touches(int u, int v, int size) const {
   return !here.empty() && cv::countNonZero(tiles(here)) > 0;
 }
 
+bool Relief::isOneWall(const cv::Rect& part) const {
+  if (empty() || (part & cv::Rect({0, 0}, seen.size())) != part) return false;
+  const std::uint8_t number = wall.at<std::uint8_t>(part.tl());
+  const auto all = [&part](const cv::Mat& picture, std::uint8_t value) {
+    for (int v = part.y; v < part.br().y; ++v) {
+      const std::uint8_t* row = picture.ptr<std::uint8_t>(v) + part.x;
+      if (std::any_of(row, row + part.width, [value](std::uint8_t x) { return x != value; }))
+        return false;
+    }
+    return true;
+  };
+  return number != 0 && all(wall, number) && all(seen, 255);
+}
+
 void Relief::index() {
   tiles = cv::Mat::zeros((seen.rows + kTile - 1) / kTile, (seen.cols + kTile - 1) / kTile, CV_8U);
   box.setEmpty(), walls.clear();
