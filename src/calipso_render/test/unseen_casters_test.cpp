@@ -60,6 +60,7 @@ TEST(LowestSun, LeavesWhatTheFullShadeWould) {
   EXPECT_EQ(sun.at<std::uint8_t>(0), 0);
   EXPECT_NEAR(0.25 + 0.75 * sun.at<std::uint8_t>(1) / 255.0, 0.4, 0.005);
   EXPECT_EQ(sun.at<std::uint8_t>(2), 255);
+  EXPECT_EQ(lowestSun(hidden, 0.0f).at<std::uint8_t>(2), 255);  // black in the shade
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "place/unseen_casters.hpp"
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
@@ -14,6 +15,7 @@ constexpr float kMost = 0.25;    // part of it that must be told
 constexpr double kApart = 0.35;  // log brightness between what has the sun and what has not
 constexpr double kMistaken = 0.1;  // part of what was told that brightness may tell wrongly
 constexpr double kPenumbra = 2.5;  // px, deviation
+constexpr float kLeastUmbra = 1e-3f;
 
 // Noise decides single pixels: what most around say, as they do.
 cv::Mat clearly(const cv::Mat& told, std::uint8_t what, std::uint8_t other) {
@@ -64,6 +66,7 @@ cv::Mat unseenCastersShade(const cv::Mat& told, const cv::Mat& plate, const cv::
 cv::Mat lowestSun(const cv::Mat& hidden, float umbra) {
   // umbra + (1 - umbra) level = umbra / (umbra + (1 - umbra) (1 - hidden))
   cv::Mat part, level;
+  umbra = std::max(umbra, kLeastUmbra);
   hidden.convertTo(part, CV_32F, umbra / 255.0);
   cv::divide(part, 1.0 - (1.0 / umbra - 1.0) * part, level, 255.0);
   level.convertTo(level, CV_8U);
