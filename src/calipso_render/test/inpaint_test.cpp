@@ -173,7 +173,7 @@ TEST(PatchOrigins, ComeFromASurfaceOfWhichLittleIsSeen) {
       elsewhere += surface.at<std::uint8_t>(from[1], from[0]) != 2;
     }
   }
-  EXPECT_LT(elsewhere, 18 * 84 / 5);
+  EXPECT_LT(elsewhere, 18 * 84 / 10);
 }
 
 // Of a thin hole coarse levels show nothing.

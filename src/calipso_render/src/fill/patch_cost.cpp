@@ -20,6 +20,16 @@ constexpr float kColourVaries = 1000.0f;  // squared code values that are not of
 constexpr float kColourAround = 61.0f;    // px of the square that tells a place's colour
 constexpr float kLivelier = 0.6f;  // part of its own gradients by which a source may have more
 
+// CV_8UC1, != 0 where the patch around a pixel sees several surfaces; empty if none are known.
+cv::Mat mixedPatches(const cv::Mat& surface) {
+  if (surface.empty()) return {};
+  const cv::Mat patch = cv::Mat::ones(kPatchSide, kPatchSide, CV_8U);
+  cv::Mat lowest = surface.clone(), highest;
+  lowest.setTo(255, surface == 0);
+  cv::erode(lowest, lowest, patch), cv::dilate(surface, highest, patch);
+  return (highest != 0) & (lowest != highest);
+}
+
 }  // namespace
 
 PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const Pattern& pattern,
@@ -45,6 +55,7 @@ PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const P
                    cv::blur(level.image, colours_, {kPatchSide, kPatchSide});
                  }});
   }
+  const cv::Mat mixed = mixedPatches(level.surface);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < level.hole.rows; ++v) {
     Known* known = &places_[v * columns_];
@@ -56,6 +67,7 @@ PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const P
     take(level.nearness, &Known::nearness);
     take(level.surface, &Known::surface);
     take(level.sky, &Known::sky);
+    take(mixed, &Known::mixed);
   }
 }
 
@@ -64,7 +76,7 @@ float PatchCost::distance(const cv::Mat& image, const cv::Mat& lively, const cv:
   using Row = Eigen::Map<const Eigen::Array<float, 4 * kPatchSide, 1>>;
   float sum = awayCost(p, q);
   // Gradients do not make up for the wrong place.
-  const float bland = blandCost(lively.at<float>(p), lively.at<float>(q));
+  const float bland = blandCost(lively, p, q);
   if (bland > 0.0f || sum < kPatchSide * kPatchSide * kMisplaced) sum += bland;
   for (int dv = -kPatchRadius; dv <= kPatchRadius && sum < bound; ++dv) {
     const Row a(image.ptr<float>(p.y + dv) + 4 * (p.x - kPatchRadius)),
@@ -112,9 +124,11 @@ inline float PatchCost::awayCost(const cv::Point& p, const cv::Point& q) const {
 }
 
 // No lower than minus what the gradients' difference costs anyway, as its mean square is no less than
-// the square of its mean.
-inline float PatchCost::blandCost(float own, float other) const {
-  const float lack = own - other, most = kLivelier * own;
+// the square of its mean. A mean over several surfaces tells of none.
+inline float PatchCost::blandCost(const cv::Mat& lively, const cv::Point& p,
+                                  const cv::Point& q) const {
+  if (at(p).mixed != 0) return 0.0f;
+  const float own = lively.at<float>(p), lack = own - lively.at<float>(q), most = kLivelier * own;
   return kPatchSide * kPatchSide * off_bland_ * std::max(lack * std::abs(lack), -most * most);
 }
 

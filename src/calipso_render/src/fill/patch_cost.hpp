@@ -53,13 +53,14 @@ class PatchCost {
   struct Known {
     float nearness;
     std::uint8_t surface, sky;
+    std::uint8_t mixed;  // != 0: the patch around it sees several surfaces
   };
 
   const Known& at(const cv::Point& p) const { return places_[p.y * columns_ + p.x]; }
   // Of the finest level.
   int rowOf(const cv::Point& p) const { return cvRound(scale_ * (p.y + 0.5f) - 0.5f); }
   inline float awayCost(const cv::Point& p, const cv::Point& q) const;
-  inline float blandCost(float own, float other) const;
+  inline float blandCost(const cv::Mat& lively, const cv::Point& p, const cv::Point& q) const;
   float offPattern(const cv::Point& p, const cv::Point& q) const;
   float offColour(const cv::Point& p, const cv::Point& q) const;
 
