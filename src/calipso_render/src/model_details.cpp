@@ -39,8 +39,7 @@ struct SeenModel {
 
 SeenModel seenModel(const Actor& actor, const cv::Size& size) {
   SeenModel model{cv::Mat::zeros(size, CV_32F), cv::Mat::zeros(size, CV_8U), {}, {}, {}, {}};
-  VisibilityBuffer buffer({{0, 0}, size});
-  buffer.draw(actor.screen, 0);
+  const VisibilityBuffer buffer({{0, 0}, size}, {&actor.screen});
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) {
       if (buffer.ids(v)[u] == VisibilityBuffer::kNothing) continue;

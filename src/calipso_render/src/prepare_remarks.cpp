@@ -23,8 +23,7 @@ double partOf(const cv::Mat& some, const cv::Mat& all) {
 
 // 255 where the actor's surface is drawn.
 cv::Mat drawn(const Actor& actor, const cv::Size& size) {
-  VisibilityBuffer buffer({0, 0, size.width, size.height});
-  buffer.draw(actor.screen, 0);
+  const VisibilityBuffer buffer({0, 0, size.width, size.height}, {&actor.screen});
   cv::Mat out = cv::Mat::zeros(size, CV_8U);
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u)

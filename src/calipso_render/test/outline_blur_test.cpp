@@ -89,8 +89,7 @@ TEST(Renderer, DrawnOutlinesAreAsSoftAsTheVideos) {
 
   const FrameInput moved = ballMovedLeft(key, *prepared);
   const Actor now = makeActor(prepared->surfaces[0], moved.objects[0].vertices, key.camera);
-  VisibilityBuffer seen({0, 0, kWidth, kHeight});
-  seen.draw(now.screen, 0);
+  const VisibilityBuffer seen({0, 0, kWidth, kHeight}, {&now.screen});
   cv::Mat labels = cv::Mat::zeros(kHeight, kWidth, CV_8U);
   for (int v = 0; v < kHeight; ++v)
     for (int u = 0; u < kWidth; ++u)

@@ -27,8 +27,7 @@ struct Mirrored {
   cv::Mat known = cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(255));
 
   Mirrored() {
-    VisibilityBuffer buffer({0, 0, kWidth, kHeight});
-    buffer.draw(actor.screen, 0);
+    const VisibilityBuffer buffer({0, 0, kWidth, kHeight}, {&actor.screen});
     for (int v = 0; v < kHeight; ++v) {
       for (int u = 0; u < kWidth; ++u) {
         if (buffer.ids(v)[u] != VisibilityBuffer::kNothing) known.at<std::uint8_t>(v, u) = 0;

@@ -25,12 +25,12 @@ const Triangles kOne = {{0, 1, 2}};
 
 TEST(VisibilityBuffer, NearerSurfaceWinsWhateverTheOrder) {
   for (const bool near_first : {true, false}) {
-    VisibilityBuffer buffer({0, 0, 20, 20});
     const ScreenMesh near = triangle(kOne, {0, 0}, {19, 0}, {0, 19}, 2.0f),
                      far = triangle(kOne, {0, 0}, {19, 0}, {0, 19}, 1.0f);
-    buffer.draw(near_first ? near : far, near_first ? 0 : 1);
-    buffer.draw(near_first ? far : near, near_first ? 1 : 0);
-    EXPECT_EQ(VisibilityBuffer::objectOf(buffer.idAt(3, 3)), 0);
+    const std::vector<const ScreenMesh*> both = {near_first ? &near : &far,
+                                                 near_first ? &far : &near};
+    const VisibilityBuffer buffer({0, 0, 20, 20}, both);
+    EXPECT_EQ(VisibilityBuffer::objectOf(buffer.idAt(3, 3)), near_first ? 0 : 1);
     EXPECT_FLOAT_EQ(buffer.nearnessAt(3, 3), 2.0f);
   }
 }
@@ -41,8 +41,7 @@ TEST(VisibilityBuffer, SharedEdgesHaveNoCracks) {
   mesh.points = {{10.37f, 9.81f, 1}, {0, 0, 1}, {20, 0, 1}, {20, 20, 1}, {0, 20, 1}};
   const Triangles fan = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
   mesh.triangles = &fan;
-  VisibilityBuffer buffer({0, 0, 21, 21});
-  buffer.draw(mesh, 0);
+  const VisibilityBuffer buffer({0, 0, 21, 21}, {&mesh});
   for (int v = 0; v <= 20; ++v) {
     for (int u = 0; u <= 20; ++u)
       EXPECT_NE(buffer.idAt(u, v), VisibilityBuffer::kNothing) << u << ", " << v;
@@ -61,8 +60,7 @@ TEST(VisibilityBuffer, CoversWhatTheEdgesEnclose) {
            k % 5 == 0 ? 17.3f + random.uniform(-0.01f, 0.01f) : random.uniform(-spread, spread)};
     }
     const ScreenMesh mesh = triangle(kOne, p[0], p[1], p[2], 1.0f);
-    VisibilityBuffer buffer({0, 0, 33, 29});
-    buffer.draw(mesh, 0);
+    const VisibilityBuffer buffer({0, 0, 33, 29}, {&mesh});
     for (int v = 0; v < 29; ++v) {
       for (int u = 0; u < 33; ++u) {
         double least = 1e30, greatest = -1e30;  // signed distances to the edges, px
@@ -84,8 +82,8 @@ TEST(VisibilityBuffer, SkipsWhatLiesBehindTheCamera) {
   Camera camera;
   camera.width = camera.height = 10, camera.fx = camera.fy = 10.0, camera.cx = camera.cy = 4.5;
   const Points behind = {{-1, -1, -1}, {1, -1, -1}, {0, 1, -1}};
-  VisibilityBuffer buffer({0, 0, 10, 10});
-  buffer.draw(projectMesh(behind, kOne, camera), 0);
+  const ScreenMesh mesh = projectMesh(behind, kOne, camera);
+  const VisibilityBuffer buffer({0, 0, 10, 10}, {&mesh});
   for (int v = 0; v < 10; ++v) {
     for (int u = 0; u < 10; ++u) EXPECT_EQ(buffer.idAt(u, v), VisibilityBuffer::kNothing);
   }
@@ -109,8 +107,7 @@ TEST(EdgeCoverage, MeasuresAreaWithinAPixel) {
   mesh.points = {{-5, -5, 1}, {10.25f, -5, 1}, {10.25f, 30, 1}, {-5, 30, 1}};
   const Triangles square = {{0, 1, 2}, {0, 2, 3}};
   mesh.triangles = &square;
-  VisibilityBuffer buffer({0, 0, 20, 20});
-  buffer.draw(mesh, 0);
+  const VisibilityBuffer buffer({0, 0, 20, 20}, {&mesh});
   EdgeCoverage edges(buffer, buffer.region());
   edges.draw(mesh, 0);
   const EdgeCoverage::Pixel* pixel = edges.at(10, 10);
@@ -126,8 +123,7 @@ TEST(EdgeCoverage, FindsPartsThinnerThanAPixel) {
   mesh.points = {{10.05f, 2, 1}, {10.3f, 2, 1}, {10.3f, 18, 1}, {10.05f, 18, 1}};
   const Triangles strip = {{0, 1, 2}, {0, 2, 3}};
   mesh.triangles = &strip;
-  VisibilityBuffer buffer({0, 0, 20, 20});
-  buffer.draw(mesh, 0);
+  const VisibilityBuffer buffer({0, 0, 20, 20}, {&mesh});
   ASSERT_EQ(buffer.idAt(10, 10), VisibilityBuffer::kNothing);
   EdgeCoverage edges(buffer, buffer.region());
   edges.chooseSilhouette(mesh, meshEdges(strip), buffer);
@@ -148,8 +144,7 @@ TEST(EdgeCoverage, SmoothsWhereAMeshHidesItself) {
                  {-5, -5, 0.25f}, {15.3f, -5, 0.25f}, {15.3f, 30, 0.25f}, {-5, 30, 0.25f}};
   const Triangles sheets = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}, {8, 9, 10}, {8, 10, 11}};
   mesh.triangles = &sheets;
-  VisibilityBuffer buffer({0, 0, 20, 20});
-  buffer.draw(mesh, 0);
+  const VisibilityBuffer buffer({0, 0, 20, 20}, {&mesh});
   EdgeCoverage edges(buffer, buffer.region());
   edges.chooseSilhouette(mesh, meshEdges(sheets), buffer);
   edges.draw(mesh, 0);

@@ -88,8 +88,7 @@ inline cv::Mat emptyTable() {
 // Calls `act(u, v, point)` for every pixel whose centre an actor covers.
 template <typename Act>
 void forEachPixelOf(const Actor& actor, const Act& act) {
-  VisibilityBuffer buffer({0, 0, kWidth, kHeight});
-  buffer.draw(actor.screen, 0);
+  const VisibilityBuffer buffer({0, 0, kWidth, kHeight}, {&actor.screen});
   const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>();
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {

@@ -47,8 +47,7 @@ TEST(SurfaceMaps, TellTheShadeOfTheGroundThatIsMirrored) {
   const Hollow hollow;
   const ShadedGround ground(table(), Light(), {&hollow}, hollow);
   const SurfaceMaps maps(actor, appearance, Light(), ground, eye);
-  VisibilityBuffer buffer({0, 0, kWidth, kHeight});
-  buffer.draw(actor.screen, 0);
+  const VisibilityBuffer buffer({0, 0, kWidth, kHeight}, {&actor.screen});
   int shaded = 0;
   SurfaceRun place;
   Eigen::Vector3f weights;
@@ -79,8 +78,7 @@ TEST(SurfaceMaps, TellWhatThePixelsShow) {
   light.ambient[1] = {0.1f, -0.1f, 0.2f};
   const SurfaceMaps maps(actor, appearance, light, ShadedGround(), eye);
   const PlaneView view({}, camera());
-  VisibilityBuffer buffer({0, 0, kWidth, kHeight});
-  buffer.draw(actor.screen, 0);
+  const VisibilityBuffer buffer({0, 0, kWidth, kHeight}, {&actor.screen});
   int seen = 0;
   SurfaceRun run, place;
   Eigen::Vector3f weights;
@@ -175,8 +173,8 @@ TEST(OutsideWinding, LeavesOutOnlyWhatIsHidden) {
   ASSERT_NE(actor.screen.hidden_side, 0);
   ScreenMesh all = actor.screen;
   all.hidden_side = 0;
-  VisibilityBuffer some({0, 0, kWidth, kHeight}), every({0, 0, kWidth, kHeight});
-  some.draw(actor.screen, 0), every.draw(all, 0);
+  const cv::Rect whole(0, 0, kWidth, kHeight);
+  const VisibilityBuffer some(whole, {&actor.screen}), every(whole, {&all});
   int different = 0;
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) different += some.ids(v)[u] != every.ids(v)[u];

@@ -33,8 +33,7 @@ struct Setting {
     const Actor& ball = view.actors[0];
     const RayShadow sun({{&ball.vertices, &surface.triangles, surface.winding}},
                         kSun.cast<double>(), {radius, 24});
-    VisibilityBuffer seen({{0, 0}, size});
-    seen.draw(ball.screen, 0);
+    const VisibilityBuffer seen({{0, 0}, size}, {&ball.screen});
     cv::RNG random(5);
     for (int v = 0; v < size.height; ++v) {
       for (int u = 0; u < size.width; ++u) {

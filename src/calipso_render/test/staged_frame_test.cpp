@@ -53,8 +53,7 @@ TEST(StagedFrame, TellsHowFarASurfaceHasMoved) {
   const StagedFrame frame(*s.prepared, p, in);
   ASSERT_EQ(frame.objects.size(), 1u);
   ASSERT_TRUE(frame.objects[0].edited && frame.objects[0].isAtRestInVideo());
-  VisibilityBuffer seen(frame.whole());
-  seen.draw(frame.objects[0].actor.screen, 0);
+  const VisibilityBuffer seen(frame.whole(), {&frame.objects[0].actor.screen});
   int pixels = 0;
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
@@ -79,8 +78,7 @@ TEST(StagedFrame, WhatIsNotMovedIsStill) {
   const RenderParams p = params();
   const FrameInput in = s.input(true, Eigen::Vector3f::Zero());
   const StagedFrame frame(*s.prepared, p, in);
-  VisibilityBuffer seen(frame.whole());
-  seen.draw(frame.objects[0].actor.screen, 0);
+  const VisibilityBuffer seen(frame.whole(), {&frame.objects[0].actor.screen});
   const Eigen::Vector2d middle = in.camera.projectWorld(kCentre);
   const int u = static_cast<int>(middle.x()), v = static_cast<int>(middle.y());
   ASSERT_NE(seen.idAt(u, v), VisibilityBuffer::kNothing);
@@ -99,8 +97,7 @@ TEST(StagedFrame, WhatHasTurnedInItsPlaceIsNotStill) {
     for (Eigen::Vector3f& x : in.objects[0].vertices)
       x += (x - eye) * (lean / distance * right.dot(x - kCentre.cast<float>()));
     const StagedFrame frame(*s.prepared, p, in);
-    VisibilityBuffer seen(frame.whole());
-    seen.draw(frame.objects[0].actor.screen, 0);
+    const VisibilityBuffer seen(frame.whole(), {&frame.objects[0].actor.screen});
     const Eigen::Vector2d middle = in.camera.projectWorld(kCentre);
     const int u = static_cast<int>(middle.x()), v = static_cast<int>(middle.y());
     EXPECT_LT(frame.movement(seen.idAt(u, v), u, v).norm(), kStillPx);

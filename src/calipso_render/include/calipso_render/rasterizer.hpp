@@ -30,20 +30,23 @@ struct ScreenMesh {
 // @param world #V points in the world, m
 ScreenMesh projectMesh(const Points& world, const Triangles& triangles, const Camera& camera);
 
+// To each of them; they have to stay where they are.
+std::vector<const ScreenMesh*> pointersTo(const std::vector<ScreenMesh>& meshes);
+
 // Bounding rectangle in whole pixels, grown by `margin` px and clipped to `size`.
 cv::Rect boundsOf(const ScreenMesh& mesh, int margin, cv::Size size);
 
-// Which surface each pixel sees: one sample at the pixel's centre, nearest surface wins.
+// Which surface each pixel sees: one sample at the pixel's centre, nearest surface wins, at a tie
+// the first.
 class VisibilityBuffer {
  public:
   static constexpr std::uint32_t kNothing = 0xffffffffu;
 
   // @param region of the picture that is kept; everything outside is clipped
+  // @param meshes at most 255; objectOf() tells the number of one among them
   // @param with_ids false: only nearness is kept
-  explicit VisibilityBuffer(const cv::Rect& region, bool with_ids = true);
-
-  // @param object 0..254, slot by which objectOf() names the mesh
-  void draw(const ScreenMesh& mesh, int object);
+  VisibilityBuffer(const cv::Rect& region, const std::vector<const ScreenMesh*>& meshes,
+                   bool with_ids = true);
 
   const cv::Rect& region() const { return region_; }
   // Region coordinates.
@@ -67,8 +70,6 @@ class VisibilityBuffer {
   static constexpr float kFar = -3.0e38f;
 
  private:
-  // triangles are split in fixed parts, rows in bands: the result knows no thread count
-  static constexpr int kParts = 32;
   // places after each row, which kernels may read and write back
   static constexpr int kPadding = 8;
 

@@ -15,13 +15,23 @@ constexpr double kNearPlane = 1e-6;       // m in front of the camera
 constexpr std::size_t kFewPoints = 4096;  // not worth sharing out
 
 constexpr int kBandRows = 32;
+constexpr int kPartTriangles = 640;
 
-// Spans by the bands of rows that they reach.
+// Some of a mesh's triangles: their spans, by the bands of rows that they reach.
 struct Part {
+  const ScreenMesh* mesh;
+  int begin, end;       // triangles
+  std::uint32_t label;  // the object's, in ids
+
   std::unique_ptr<TriangleSpan[]> spans;
   int count = 0;
   std::vector<int> sorted;  // numbers of spans, ascending in each band
   std::vector<int> first;   // per band: its first in `sorted`, and one more
+
+  void makeSpans(const cv::Rect& region) {
+    spans.reset(new TriangleSpan[end - begin]);
+    count = kernels().makeSpans(*mesh, begin, end, label, region, spans.get());
+  }
 
   void sort(int bands) {
     first.assign(bands + 2, 0);
@@ -37,6 +47,22 @@ struct Part {
     }
   }
 };
+
+// Adds the mesh's parts, in the order of its triangles.
+void split(const ScreenMesh& mesh, std::size_t object, std::vector<Part>& parts) {
+  const int count = static_cast<int>(mesh.triangles->size());
+  for (int begin = 0; begin < count; begin += kPartTriangles) {
+    parts.push_back({&mesh, begin, std::min(begin + kPartTriangles, count),
+                     static_cast<std::uint32_t>(object) << 24, nullptr, 0, {}, {}});
+  }
+}
+
+void clear(const SpanTarget& target) {
+  const std::size_t first = static_cast<std::size_t>(target.first) * target.stride,
+                    count = static_cast<std::size_t>(target.last + 1) * target.stride - first;
+  if (target.ids != nullptr) std::fill_n(target.ids + first, count, VisibilityBuffer::kNothing);
+  std::fill_n(target.nearness + first, count, VisibilityBuffer::kFar);
+}
 
 }  // namespace
 
@@ -61,6 +87,12 @@ ScreenMesh projectMesh(const Points& world, const Triangles& triangles, const Ca
   return mesh;
 }
 
+std::vector<const ScreenMesh*> pointersTo(const std::vector<ScreenMesh>& meshes) {
+  std::vector<const ScreenMesh*> all;
+  for (const ScreenMesh& mesh : meshes) all.push_back(&mesh);
+  return all;
+}
+
 cv::Rect boundsOf(const ScreenMesh& mesh, int margin, cv::Size size) {
   float left = 1e9f, top = 1e9f, right = -1e9f, bottom = -1e9f;
 #pragma omp parallel for schedule(static) if (mesh.points.size() > kFewPoints) \
@@ -83,40 +115,28 @@ cv::Rect boundsOf(const ScreenMesh& mesh, int margin, cv::Size size) {
   return {u0, v0, std::max(0, u1 - u0), std::max(0, v1 - v0)};
 }
 
-VisibilityBuffer::VisibilityBuffer(const cv::Rect& region, bool with_ids)
+VisibilityBuffer::VisibilityBuffer(const cv::Rect& region,
+                                   const std::vector<const ScreenMesh*>& meshes, bool with_ids)
     : region_(region),
       stride_(region.width + kPadding),
       ids_(with_ids ? new std::uint32_t[static_cast<std::size_t>(stride_) * region.height]
                     : nullptr),
       near_(new float[static_cast<std::size_t>(stride_) * region.height]) {
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < region.height; ++v) {
-    const std::size_t first = static_cast<std::size_t>(v) * stride_;
-    if (with_ids) std::fill_n(&ids_[first], stride_, kNothing);
-    std::fill_n(&near_[first], stride_, kFar);
-  }
-}
-
-void VisibilityBuffer::draw(const ScreenMesh& mesh, int object) {
-  const int count = static_cast<int>(mesh.triangles->size()),
-            bands = (region_.height + kBandRows - 1) / kBandRows;
-  Part parts[kParts];  // of the triangles, in their order
+  const int bands = (region.height + kBandRows - 1) / kBandRows;
+  std::vector<Part> parts;
+  for (std::size_t k = 0; k < meshes.size(); ++k) split(*meshes[k], k, parts);
 #pragma omp parallel
   {
 #pragma omp for schedule(dynamic, 1)
-    for (int k = 0; k < kParts; ++k) {
-      const int begin = static_cast<int>(static_cast<long>(count) * k / kParts),
-                end = static_cast<int>(static_cast<long>(count) * (k + 1) / kParts);
-      parts[k].spans.reset(new TriangleSpan[end - begin]);
-      parts[k].count =
-          kernels().makeSpans(mesh, begin, end, static_cast<std::uint32_t>(object) << 24, region_,
-                              parts[k].spans.get());
-      parts[k].sort(bands);
+    for (Part& part : parts) {
+      part.makeSpans(region);
+      part.sort(bands);
     }
 #pragma omp for schedule(dynamic, 1)
     for (int band = 0; band < bands; ++band) {
       const SpanTarget target{ids_.get(), near_.get(), stride_, band * kBandRows,
-                              std::min((band + 1) * kBandRows, region_.height) - 1};
+                              std::min((band + 1) * kBandRows, region.height) - 1};
+      clear(target);
       for (const Part& part : parts) {
         kernels().fill(part.spans.get(), &part.sorted[part.first[band]],
                        part.first[band + 1] - part.first[band], target);

@@ -52,9 +52,10 @@ ShadowMap::ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector
   height_ = static_cast<int>((high.y() - low.y()) / texel_) + 2 * kMargin + 1;
   origin_ = Eigen::Vector3f(low.x() - kMargin * texel_, low.y() - kMargin * texel_, low.z());
   highest_ = high.z() - low.z();
-  map_.emplace(cv::Rect(0, 0, width_, height_), false);
-  for (const Occluder& o : occluders) {
-    ScreenMesh mesh;
+  std::vector<ScreenMesh> meshes(occluders.size());
+  for (std::size_t k = 0; k < occluders.size(); ++k) {
+    const Occluder& o = occluders[k];
+    ScreenMesh& mesh = meshes[k];
     mesh.triangles = o.triangles;
     mesh.hidden_side = -o.winding;  // the light looks along rows upwards
     mesh.points.resize(o.vertices->size());
@@ -64,8 +65,8 @@ ShadowMap::ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector
       mesh.points[i] = {(p.dot(axis_s_) - origin_.x()) * per_texel_,
                         (p.dot(axis_t_) - origin_.y()) * per_texel_, p.dot(axis_h_) - origin_.z()};
     }
-    map_->draw(mesh, 0);
   }
+  map_.emplace(cv::Rect(0, 0, width_, height_), pointersTo(meshes), false);
   buildLevels();
 }
 

@@ -107,20 +107,24 @@ SkyMap::SkyMap(const std::vector<Occluder>& occluders, const Eigen::Vector3d& up
 }
 
 void SkyMap::keepHeights(const std::vector<Occluder>& occluders) {
-  const cv::Rect all(0, 0, width_, depth_);
-  VisibilityBuffer tops(all, false), bottoms(all, false);
-  for (const Occluder& o : occluders) {
-    ScreenMesh mesh;
+  std::vector<ScreenMesh> above(occluders.size());
+  for (std::size_t k = 0; k < occluders.size(); ++k) {
+    const Occluder& o = occluders[k];
+    ScreenMesh& mesh = above[k];
     mesh.triangles = o.triangles;
     mesh.hidden_side = -o.winding;  // from above, along rows upwards
     mesh.points.resize(o.vertices->size());
 #pragma omp parallel for schedule(static)
     for (std::size_t i = 0; i < mesh.points.size(); ++i) mesh.points[i] = placeOf((*o.vertices)[i]);
-    tops.draw(mesh, 0);
-    mesh.hidden_side = o.winding;
-    for (Eigen::Vector3f& p : mesh.points) p.z() = -p.z();
-    bottoms.draw(mesh, 0);
   }
+  std::vector<ScreenMesh> below = above;
+  for (ScreenMesh& mesh : below) {
+    mesh.hidden_side = -mesh.hidden_side;
+    for (Eigen::Vector3f& p : mesh.points) p.z() = -p.z();
+  }
+  const cv::Rect all(0, 0, width_, depth_);
+  const VisibilityBuffer tops(all, pointersTo(above), false),
+      bottoms(all, pointersTo(below), false);
   columns_.assign(static_cast<std::size_t>(width_) * depth_, kOpen);
 #pragma omp parallel for schedule(static)
   for (int j = 0; j < depth_; ++j) {

@@ -77,61 +77,55 @@ SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance, const
       corner_(appearance.region.tl()),
       vertices_(actor.normals.size()),
       triangles_(new TriangleMap[actor.surface->triangles.size()]) {
-  findAround(appearance, light, ground, eye);
-  const Triangles& triangles = actor.surface->triangles;
+  around_.resize(actor.seen.size()), around_behind_.resize(actor.seen_behind.size());
   const Camera& c = appearance.key_camera;
   const Eigen::Isometry3f camera_from_world = c.world_from_camera.inverse().cast<float>();
 #pragma omp parallel
   {
-#pragma omp for schedule(static)
+#pragma omp for schedule(static, 64)
     for (std::size_t i = 0; i < vertices_.size(); ++i) {
       const int vertex = actor.surface->vertex_of_normal[i];
       const Eigen::Vector3f q = camera_from_world * actor.surface->key_vertices[vertex],
-                            sight = actor.vertices[vertex] - eye, &n = actor.normals[i];
+                            &at = actor.vertices[vertex], sight = at - eye, &n = actor.normals[i];
       vertices_[i] = {
           {sight.x(), sight.y(), sight.z(), 0.0f},
           {n.x(), n.y(), n.z(), 0.0f},
           {static_cast<float>(c.fx) * q.x() + static_cast<float>(c.cx) * q.z(),
            static_cast<float>(c.fy) * q.y() + static_cast<float>(c.cy) * q.z(), q.z(), 1.0f}};
+      const auto around = [&](const SkySeen& seen, const Eigen::Vector3f& normal) -> Around {
+        const cv::Vec3f ambient = ambientOn(light, seen, appearance.thrown_back);
+        const Eigen::Vector3f view = -sight.normalized(), mirrored = mirroredIn(normal, view);
+        // A vertex that faces away by little has triangles that are seen.
+        const float lit = normal.dot(view) > kAway ? ground.lit(at, mirrored) : 1.0f;
+        return {{ambient[0], ambient[1], ambient[2], 0.0f},
+                {0.0f, 0.0f, 0.0f, skyMirrored(seen, mirrored, lit)}};
+      };
+      around_[i] = around(actor.seen[i], n);
+      if (!around_behind_.empty()) around_behind_[i] = around(actor.seen_behind[i], -n);
     }
 #pragma omp for schedule(static, 64)
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
-      const Eigen::Vector3i& corners = triangles[t];
-      Eigen::Vector3f p[3];
-      for (int i = 0; i < 3; ++i) p[i] = actor.screen.points[corners[i]];
-      triangles_[t].traits = TriangleMap::kThin;
-      if (actor.screen.hides(areaOf(p))) continue;
-      triangles_[t].traits = traitsOf(appearance.sources[t]);
-      if (isTurned(actor, corners, eye)) triangles_[t].traits |= TriangleMap::kTurned;
-      const std::vector<Around>& around = aroundOf(static_cast<int>(t));
-      const auto corner = [&](int i) -> Corner {
-        const int number = actor.surface->corners[t][i];
-        const Vertex& x = vertices_[number];
-        return {x.key, x.normal, around[number].sky, around[number].light};
-      };
-      if (!fill(p, {corner(0), corner(1), corner(2)}, triangles_[t]))
-        triangles_[t].traits |= TriangleMap::kThin;
-    }
+    for (std::size_t t = 0; t < actor.surface->triangles.size(); ++t)
+      fillTriangle(t, appearance, eye);
   }
 }
 
-void SurfaceMaps::findAround(const Appearance& appearance, const Light& light,
-                             const ShadedGround& ground, const Eigen::Vector3f& eye) {
-  const auto find = [&](const std::vector<SkySeen>& seen, float side, std::vector<Around>& around) {
-    around.resize(seen.size());
-#pragma omp parallel for schedule(static)
-    for (std::size_t i = 0; i < seen.size(); ++i) {
-      const cv::Vec3f ambient = ambientOn(light, seen[i], appearance.thrown_back);
-      const Eigen::Vector3f& at = actor_->vertices[actor_->surface->vertex_of_normal[i]];
-      const Eigen::Vector3f n = side * actor_->normals[i], view = (eye - at).normalized(),
-                            mirrored = mirroredIn(n, view);
-      // A vertex that faces away by little has triangles that are seen.
-      const float lit = n.dot(view) > kAway ? ground.lit(at, mirrored) : 1.0f,
-                  sky = skyMirrored(seen[i], mirrored, lit);
-      around[i] = {{ambient[0], ambient[1], ambient[2], 0.0f}, {0.0f, 0.0f, 0.0f, sky}};
-    }
+void SurfaceMaps::fillTriangle(std::size_t t, const Appearance& appearance,
+                               const Eigen::Vector3f& eye) {
+  const Eigen::Vector3i& corners = actor_->surface->triangles[t];
+  TriangleMap& map = triangles_[t];
+  Eigen::Vector3f p[3];
+  for (int i = 0; i < 3; ++i) p[i] = actor_->screen.points[corners[i]];
+  map.traits = TriangleMap::kThin;
+  if (actor_->screen.hides(areaOf(p))) return;
+  map.traits = traitsOf(appearance.sources[t]);
+  if (isTurned(*actor_, corners, eye)) map.traits |= TriangleMap::kTurned;
+  const std::vector<Around>& around = aroundOf(static_cast<int>(t));
+  const auto corner = [&](int i) -> Corner {
+    const int number = actor_->surface->corners[t][i];
+    const Vertex& x = vertices_[number];
+    return {x.key, x.normal, around[number].sky, around[number].light};
   };
-  find(actor_->seen, 1.0f, around_), find(actor_->seen_behind, -1.0f, around_behind_);
+  if (!fill(p, {corner(0), corner(1), corner(2)}, map)) map.traits |= TriangleMap::kThin;
 }
 
 void SurfaceMaps::locate(const SurfacePlace* places, int count, SurfaceRun& run,

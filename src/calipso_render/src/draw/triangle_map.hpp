@@ -64,8 +64,7 @@ class SurfaceMaps {
     float sky[4];    // 0, 0, 0, sky
   };
 
-  void findAround(const Appearance& appearance, const Light& light, const ShadedGround& ground,
-                  const Eigen::Vector3f& eye);
+  void fillTriangle(std::size_t t, const Appearance& appearance, const Eigen::Vector3f& eye);
   const std::vector<Around>& aroundOf(int triangle) const {
     const bool behind = of(triangle).is(TriangleMap::kTurned) && !around_behind_.empty();
     return behind ? around_behind_ : around_;

@@ -12,6 +12,12 @@ CALIPSO_WIDE_LOOPS void markSeen(const std::uint32_t* ids, int count, std::uint8
   for (int i = 0; i < count; ++i) seen[i] = ids[i] != VisibilityBuffer::kNothing ? 255 : 0;
 }
 
+std::vector<const ScreenMesh*> screensOf(const StagedFrame& frame) {
+  std::vector<const ScreenMesh*> screens;
+  for (const StagedObject& object : frame.objects) screens.push_back(&object.actor.screen);
+  return screens;
+}
+
 }  // namespace
 
 DrawnSurfaces::DrawnSurfaces(const StagedFrame& frame, const SeenPlace& place,
@@ -21,13 +27,11 @@ DrawnSurfaces::DrawnSurfaces(const StagedFrame& frame, const SeenPlace& place,
       region_(region.all),
       box_(region.drawn),
       removed_(removed),
-      centre_(region.all) {
+      centre_(region.all, screensOf(frame)) {
   for (const StagedObject& object : frame.objects)
     always_drawn_.push_back(object.edited && place.fronts[object.surface].empty());
   all_drawn_ =
       std::all_of(always_drawn_.begin(), always_drawn_.end(), [](bool always) { return always; });
-  for (std::size_t slot = 0; slot < frame.objects.size(); ++slot)
-    centre_.draw(frame.objects[slot].actor.screen, static_cast<int>(slot));
   findMask();
   if (!box_.empty())
     covered_ =

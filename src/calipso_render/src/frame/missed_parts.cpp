@@ -66,8 +66,7 @@ Outlines outlines(const StagedFrame& frame) {
     const Actor actor = makeActor(surface, *vertices, frame.input.camera);
     const cv::Rect box = boundsOf(actor.screen, kOff + 1, within.size());
     if (box.empty()) continue;
-    VisibilityBuffer buffer(box);
-    buffer.draw(actor.screen, 0);
+    const VisibilityBuffer buffer(box, {&actor.screen});
     cv::Mat outline = cv::Mat::zeros(box.size(), CV_8U);
     for (int v = 0; v < box.height; ++v) {
       for (int u = 0; u < box.width; ++u) {

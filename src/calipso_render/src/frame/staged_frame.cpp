@@ -162,8 +162,8 @@ bool StagedFrame::isSeenAt(int surface, const Points& vertices) const {
   const cv::Mat seen = labels == s.index;
   const cv::Rect box = cv::boundingRect(seen);
   if (box.empty()) return true;  // something hides it
-  VisibilityBuffer outline(box);
-  outline.draw(projectMesh(vertices, s.triangles, input.camera), 0);
+  const ScreenMesh mesh = projectMesh(vertices, s.triangles, input.camera);
+  const VisibilityBuffer outline(box, {&mesh});
   int within = 0, all = 0;
   for (int v = 0; v < box.height; ++v) {
     const std::uint8_t* row = seen.ptr<std::uint8_t>(box.y + v) + box.x;

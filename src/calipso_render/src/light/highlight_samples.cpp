@@ -24,8 +24,7 @@ NormalMap normalMap(const View& view, const Actor& actor, const Eigen::Vector3f&
   map.region = boundsOf(actor.screen, 1, view.picture.size());
   map.normals = cv::Mat::zeros(map.region.size(), CV_32FC3);
   map.triangles = cv::Mat(map.region.size(), CV_32S, cv::Scalar(-1));
-  VisibilityBuffer buffer(map.region);
-  buffer.draw(actor.screen, 0);
+  const VisibilityBuffer buffer(map.region, {&actor.screen});
   for (int v = 0; v < map.region.height; ++v) {
     for (int u = 0; u < map.region.width; ++u) {
       const std::uint32_t id = buffer.ids(v)[u];

@@ -77,8 +77,7 @@ void sampleView(const View& view, int picture, std::size_t object, std::size_t l
                 std::vector<LightSample>& samples) {
   const Actor& actor = view.actors[object];
   const Eigen::Vector3f eye = view.camera.world_from_camera.translation().cast<float>();
-  VisibilityBuffer buffer(boundsOf(actor.screen, 0, view.picture.size()));
-  buffer.draw(actor.screen, 0);
+  const VisibilityBuffer buffer(boundsOf(actor.screen, 0, view.picture.size()), {&actor.screen});
   cv::Mat inside;
   cv::erode(view.labels == actor.surface->index, inside,
             cv::Mat::ones(2 * kRim + 1, 2 * kRim + 1, CV_8U));

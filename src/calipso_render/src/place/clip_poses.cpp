@@ -16,8 +16,8 @@ double overlap(const ObjectModel& model, const ObjectPose& pose, const ClipFrame
     vertices.push_back((pose.world_from_object * model.mesh.vertex(i)).cast<float>());
   for (int t = 0; t < model.mesh.triangleCount(); ++t)
     triangles.push_back(model.mesh.triangles.row(t));
-  VisibilityBuffer buffer({0, 0, frame.labels.cols, frame.labels.rows});
-  buffer.draw(projectMesh(vertices, triangles, frame.camera), 0);
+  const ScreenMesh mesh = projectMesh(vertices, triangles, frame.camera);
+  const VisibilityBuffer buffer({0, 0, frame.labels.cols, frame.labels.rows}, {&mesh});
   long both = 0, either = 0;
   for (int v = 0; v < frame.labels.rows; ++v) {
     const std::uint32_t* ids = buffer.ids(v);

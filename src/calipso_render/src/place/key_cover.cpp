@@ -65,8 +65,7 @@ cv::Mat opened(const cv::Mat& mask, int width) {
 
 cv::Mat outlineOf(const Actor& actor, const cv::Size& size) {
   cv::Mat outline = cv::Mat::zeros(size, CV_8U);
-  VisibilityBuffer buffer({0, 0, size.width, size.height});
-  buffer.draw(actor.screen, 0);
+  const VisibilityBuffer buffer({0, 0, size.width, size.height}, {&actor.screen});
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) {
       if (buffer.ids(v)[u] != VisibilityBuffer::kNothing) outline.at<std::uint8_t>(v, u) = 255;

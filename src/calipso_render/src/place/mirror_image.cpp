@@ -45,9 +45,7 @@ void addPlane(const std::vector<const Actor*>& actors, const Radiance& radiance,
     box |= boundsOf(meshes.back(), 1, {camera.width, camera.height});
   }
   if (box.empty()) return;
-  VisibilityBuffer buffer(box);
-  for (std::size_t slot = 0; slot < meshes.size(); ++slot)
-    buffer.draw(meshes[slot], static_cast<int>(slot));
+  const VisibilityBuffer buffer(box, pointersTo(meshes));
   const Eigen::Vector3f n = plane.normal.cast<float>(),
                         eye = camera.world_from_camera.translation().cast<float>();
   const Eigen::Vector3f mirrored_eye =

@@ -85,8 +85,7 @@ Shaded lightOn(const Actor& actor, const cv::Rect& region, const Camera& camera,
   for (cv::Mat* values : {&s.glint, &s.nearness, &s.sky})
     *values = cv::Mat::zeros(region.size(), CV_32F);
   s.triangle = cv::Mat(region.size(), CV_32S, cv::Scalar(-1));
-  VisibilityBuffer buffer(region);
-  buffer.draw(actor.screen, 0);
+  const VisibilityBuffer buffer(region, {&actor.screen});
   const Eigen::Vector3f eye = camera.world_from_camera.translation().cast<float>();
   std::vector<cv::Vec3d> sums(region.height);
   std::vector<int> counts(region.height, 0);

@@ -71,8 +71,7 @@ ClipFrame keyFrame(const ObjectModel& model, const std::vector<SupportPlane>& pl
                   cv::Mat::zeros(camera.height, camera.width, CV_8U), camera};
   const Surface surface = makeSurface(model);
   const Actor actor = makeActor(surface, surface.key_vertices, camera);
-  VisibilityBuffer buffer({0, 0, camera.width, camera.height});
-  buffer.draw(actor.screen, 0);
+  const VisibilityBuffer buffer({0, 0, camera.width, camera.height}, {&actor.screen});
   const Light light = caseLight();
   const ShadowMap sun({{&actor.vertices, &surface.triangles}}, light.direction.cast<double>(),
                       {768, 0.025, 16});

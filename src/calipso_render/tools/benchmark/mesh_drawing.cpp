@@ -19,8 +19,7 @@ cv::Mat MeshDrawing::draw(const Points& vertices) const {
   const Camera& camera = prepared_.camera;
   const Actor actor = makeActor(prepared_.surfaces.front(), vertices, camera);
   const cv::Rect box = boundsOf(actor.screen, 1, {camera.width, camera.height});
-  VisibilityBuffer seen(box);
-  seen.draw(actor.screen, 0);
+  const VisibilityBuffer seen(box, {&actor.screen});
   const SurfaceMaps maps(actor, prepared_.appearances.front(), prepared_.light.light, {},
                          sight_.eye());
   cv::Mat picture = cv::Mat::zeros(camera.height, camera.width, CV_8UC3);
