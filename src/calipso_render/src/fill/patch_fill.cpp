@@ -73,12 +73,14 @@ class Filling {
 
   void peel(const cv::Mat& part) {
     cv::Mat known = part == 0, ring;
+    const cv::Rect box = cv::boundingRect(part);
     for (;;) {
-      cv::dilate(known, ring, cv::Mat::ones(3, 3, CV_8U));
-      ring &= part & (known == 0);
+      cv::dilate(known(box), ring, cv::Mat::ones(3, 3, CV_8U));
+      ring &= part(box) & (known(box) == 0);
       std::vector<cv::Point> pixels;
       cv::findNonZero(ring, pixels);
       if (pixels.empty()) return;
+      for (cv::Point& pixel : pixels) pixel += box.tl();
       std::vector<Guess> guesses(pixels.size());
 #pragma omp parallel for schedule(dynamic, 8)
       for (std::size_t i = 0; i < pixels.size(); ++i)
@@ -88,7 +90,7 @@ class Filling {
         const cv::Point p = centreFor(pixel);
         image_.at<cv::Vec4f>(pixel) = image_.at<cv::Vec4f>(match(p) + pixel - p);
       }
-      known |= ring;
+      known(box) |= ring;
     }
   }
 
@@ -180,6 +182,7 @@ class Filling {
   // Every hole pixel becomes what the patch around it has there.
   void copy() {
     const cv::Mat from = origins();
+#pragma omp parallel for schedule(static)
     for (int v = 0; v < hole_.rows; ++v) {
       for (int u = 0; u < hole_.cols; ++u) {
         const cv::Vec2s q = from.at<cv::Vec2s>(v, u);
@@ -190,6 +193,7 @@ class Filling {
 
   cv::Mat origins() const {
     cv::Mat origin(hole_.size(), CV_16SC2, cv::Scalar(-1, -1));
+#pragma omp parallel for schedule(static)
     for (int v = 0; v < hole_.rows; ++v) {
       for (int u = 0; u < hole_.cols; ++u) {
         if (hole_.at<std::uint8_t>(v, u) == 0) continue;

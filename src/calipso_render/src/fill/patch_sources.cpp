@@ -18,10 +18,16 @@ PatchSources::PatchSources(const cv::Mat& source, const cv::Mat& surface)
   cv::erode(source, whole_, cv::Mat::ones(kPatchSide, kPatchSide, CV_8U), {-1, -1}, 1,
             cv::BORDER_CONSTANT, cv::Scalar(0));
   cv::findNonZero(whole_, all_);
-  for (const cv::Point& p : all_) {
-    ++row_starts_[p.y + 1];
-    const int label = surface.empty() ? 0 : surface.at<std::uint8_t>(p);
-    if (label != 0) on_surface_[label].push_back(p);
+  for (const cv::Point& p : all_) ++row_starts_[p.y + 1];
+  if (!surface.empty()) {
+    std::array<std::size_t, 256> counts = {};
+    for (const cv::Point& p : all_) ++counts[surface.at<std::uint8_t>(p)];
+    for (std::size_t label = 1; label < counts.size(); ++label)
+      on_surface_[label].reserve(counts[label]);
+    for (const cv::Point& p : all_) {
+      const int label = surface.at<std::uint8_t>(p);
+      if (label != 0) on_surface_[label].push_back(p);
+    }
   }
   std::partial_sum(row_starts_.begin(), row_starts_.end(), row_starts_.begin());
 }

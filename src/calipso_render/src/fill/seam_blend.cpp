@@ -22,16 +22,16 @@ constexpr float kRelax = 1.8f, kRelaxEdge = 1.46f;
 constexpr int kIterations = 30, kIterationsEdge = 12;
 const cv::Point kAround[] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
 
-struct Node {
-  int neighbours[4];     // what is no unknown is the node after the last, which nothing is added to
-  float count = 0.0f;    // neighbours that pull, known ones included
-  cv::Vec4f seam, edge;  // what the copies' differences leave over, as a seam and as an edge
-  cv::Point at;
+struct Links {
+  int neighbours[4];   // what is no unknown is the node after the last, which nothing is added to
+  float count = 0.0f;  // neighbours that pull, known ones included
 };
 
 // All of one colour, then all of the other: where either and their end begin.
 struct Nodes {
-  std::vector<Node> all;
+  std::vector<cv::Point> places;
+  std::vector<Links> links;
+  std::vector<cv::Vec4f> seams, edges;  // what the copies' differences leave over, as which
   std::array<std::size_t, 3> first_of;
 };
 
@@ -53,40 +53,41 @@ class Seams {
   // that none waits for another of its colour.
   Nodes nodes() const {
     cv::Mat index(hole_.size(), CV_32S, cv::Scalar(-1));
-    Nodes result;
-    std::vector<Node>& nodes = result.all;
-    nodes.reserve(cv::countNonZero(hole_));
+    Nodes nodes;
+    nodes.places.reserve(cv::countNonZero(hole_));
     for (int colour = 0; colour < 2; ++colour) {
-      result.first_of[colour] = nodes.size();
+      nodes.first_of[colour] = nodes.places.size();
       for (int v = 0; v < hole_.rows; ++v) {
         for (int u = (v + colour) % 2; u < hole_.cols; u += 2) {
           if (hole_.at<std::uint8_t>(v, u) == 0) continue;
-          index.at<int>(v, u) = static_cast<int>(nodes.size());
-          Node node;
-          node.at = {u, v};
-          nodes.push_back(node);
+          index.at<int>(v, u) = static_cast<int>(nodes.places.size());
+          nodes.places.emplace_back(u, v);
         }
       }
     }
+    const std::size_t count = nodes.places.size();
+    nodes.first_of[2] = count;
+    nodes.links.resize(count), nodes.seams.resize(count), nodes.edges.resize(count);
 #pragma omp parallel for schedule(static)
-    for (std::size_t k = 0; k < nodes.size(); ++k) link(index, nodes[k], nodes.size());
-    result.first_of[2] = nodes.size();
-    return result;
+    for (std::size_t k = 0; k < count; ++k) link(index, k, nodes);
+    return nodes;
   }
 
  private:
-  void link(const cv::Mat& index, Node& node, std::size_t none) const {
+  void link(const cv::Mat& index, std::size_t k, Nodes& nodes) const {
+    const cv::Point p = nodes.places[k];
+    Links& links = nodes.links[k];
     for (int i = 0; i < 4; ++i) {
-      const cv::Point q = node.at + kAround[i];
-      node.neighbours[i] = static_cast<int>(none);
+      const cv::Point q = p + kAround[i];
+      links.neighbours[i] = static_cast<int>(nodes.places.size());
       if (!inside(q) || (index.at<int>(q) < 0 && source_.at<std::uint8_t>(q) == 0)) continue;
-      if (index.at<int>(q) >= 0 && has_planes_ && differ(planes_, node.at, q)) continue;
-      if (index.at<int>(q) >= 0) node.neighbours[i] = index.at<int>(q);
-      node.count += 1.0f;
-      const cv::Vec3f miss = colour(q) - colour(node.at) - wanted(node.at, q);
+      if (index.at<int>(q) >= 0 && has_planes_ && differ(planes_, p, q)) continue;
+      if (index.at<int>(q) >= 0) links.neighbours[i] = index.at<int>(q);
+      links.count += 1.0f;
+      const cv::Vec3f miss = colour(q) - colour(p) - wanted(p, q);
       const cv::Vec3f seam =
-          isInSky(node.at, q) ? miss : miss / (1.0f + miss.dot(miss) / (kEdge * kEdge));
-      node.seam += widened(seam), node.edge += widened(miss - seam);
+          isInSky(p, q) ? miss : miss / (1.0f + miss.dot(miss) / (kEdge * kEdge));
+      nodes.seams[k] += widened(seam), nodes.edges[k] += widened(miss - seam);
     }
   }
 
@@ -128,21 +129,20 @@ class Seams {
 
 // What is added: mismatches spread by a screened Poisson equation, all channels at once. Known
 // pixels, for which the last node stands, get nothing.
-std::vector<cv::Vec4f> spread(const Nodes& nodes, cv::Vec4f Node::*mismatch, float screen,
-                              float relax, int iterations) {
-  std::vector<cv::Vec4f> change(nodes.all.size() + 1, cv::Vec4f::all(0.0f));
+std::vector<cv::Vec4f> spread(const Nodes& nodes, const std::vector<cv::Vec4f>& mismatch,
+                              float screen, float relax, int iterations) {
+  std::vector<cv::Vec4f> change(nodes.places.size() + 1, cv::Vec4f::all(0.0f));
   const auto at = [&](int i) { return cv::v_load(change[i].val); };
 #pragma omp parallel
   for (int k = 0; k < 2 * iterations; ++k) {
 #pragma omp for schedule(static)
     for (std::size_t i = nodes.first_of[k % 2]; i < nodes.first_of[k % 2 + 1]; ++i) {
-      const Node& n = nodes.all[i];
-      const int* j = n.neighbours;
-      const cv::v_float32x4 own = at(static_cast<int>(i)), sum = cv::v_load((n.*mismatch).val) +
+      const auto& [j, count] = nodes.links[i];
+      const cv::v_float32x4 own = at(static_cast<int>(i)), sum = cv::v_load(mismatch[i].val) +
                                                                  at(j[0]) + at(j[1]) + at(j[2]) +
                                                                  at(j[3]);
       cv::v_store(change[i].val, own * cv::v_setall_f32(1.0f - relax) +
-                                     sum * cv::v_setall_f32(relax / (n.count + screen)));
+                                     sum * cv::v_setall_f32(relax / (count + screen)));
     }
   }
   return change;
@@ -153,11 +153,11 @@ std::vector<cv::Vec4f> spread(const Nodes& nodes, cv::Vec4f Node::*mismatch, flo
 void blendSeams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin,
                 const cv::Mat& planes, const cv::Mat& sky, cv::Mat& image) {
   const Nodes nodes = Seams(hole, source, origin, planes, sky, image).nodes();
-  const std::vector<cv::Vec4f> wide = spread(nodes, &Node::seam, kScreen, kRelax, kIterations),
-                               narrow = spread(nodes, &Node::edge, kScreenEdge, kRelaxEdge,
+  const std::vector<cv::Vec4f> wide = spread(nodes, nodes.seams, kScreen, kRelax, kIterations),
+                               narrow = spread(nodes, nodes.edges, kScreenEdge, kRelaxEdge,
                                                kIterationsEdge);
-  for (std::size_t i = 0; i < nodes.all.size(); ++i) {
-    cv::Vec3f& colour = image.at<cv::Vec3f>(nodes.all[i].at);
+  for (std::size_t i = 0; i < nodes.places.size(); ++i) {
+    cv::Vec3f& colour = image.at<cv::Vec3f>(nodes.places[i]);
     for (int c = 0; c < 3; ++c)
       colour[c] = std::min(255.0f, std::max(0.0f, colour[c] + wide[i][c] + narrow[i][c]));
   }

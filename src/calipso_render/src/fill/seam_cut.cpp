@@ -1,10 +1,12 @@
 #include "fill/seam_cut.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <map>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/imgproc/detail/gcgraph.hpp>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -108,9 +110,16 @@ class Seams {
   // Every copy once, in order: only such as are out of each other's reach at the same time, with
   // the same result.
   void expandAll() {
-    for (const std::vector<int>& wave : waves()) {
-#pragma omp parallel for schedule(dynamic, 1)
-      for (std::size_t i = 0; i < wave.size(); ++i) expand(wave[i]);
+    const std::vector<Turn> turns = inTurns();
+    std::vector<std::atomic<bool>> done(pixels_.size());
+    // Whom a turn waits for has begun before it.
+#pragma omp parallel for schedule(monotonic : dynamic, 1)
+    for (std::size_t i = 0; i < turns.size(); ++i) {
+      for (const int other : turns[i].after) {
+        while (!done[other].load(std::memory_order_acquire)) std::this_thread::yield();
+      }
+      expand(turns[i].label);
+      done[turns[i].label].store(true, std::memory_order_release);
     }
   }
 
@@ -126,33 +135,43 @@ class Seams {
   }
 
  private:
-  // The copies that may grow. Each is in the first wave after those of all before it that reach
-  // where it does: others only take pixels from a copy until its own turn.
-  std::vector<std::vector<int>> waves() const {
-    std::vector<std::vector<int>> waves;
+  // A copy that may grow. It waits for those before it that reach where it does: others only take
+  // pixels from a copy until its own turn.
+  struct Turn {
+    int label;
+    int wave;                // more than those of all that it waits for
+    std::vector<int> after;  // labels
+  };
+
+  // Who waits for fewer others has its turn first, of these the largest.
+  std::vector<Turn> inTurns() const {
+    std::vector<Turn> turns;
     const int reach = kReach + 1, columns = (hole_.cols + 2 * reach) / kTile + 1,
               rows = (hole_.rows + 2 * reach) / kTile + 1;
-    std::vector<std::size_t> next(columns * rows, 0);   // free wave of every tile
-    std::vector<int> last_of(columns * rows, kNoCopy);  // copy in it
+    std::vector<int> last_of(columns * rows, kNoCopy);  // turn in every tile
     for (std::size_t label = 0; label < pixels_.size(); ++label) {
       if (pixels_[label].size() < kFewest) continue;
-      std::vector<int> tiles;
+      Turn turn{static_cast<int>(label), 0, {}};
+      const int number = static_cast<int>(turns.size());
       for (const cv::Point& p : pixels_[label]) {
         for (int v = p.y / kTile; v <= (p.y + 2 * reach) / kTile; ++v) {
           for (int u = p.x / kTile; u <= (p.x + 2 * reach) / kTile; ++u) {
             int& last = last_of[v * columns + u];
-            if (last != static_cast<int>(label)) tiles.push_back(v * columns + u);
-            last = static_cast<int>(label);
+            if (last != kNoCopy && last != number) {
+              turn.after.push_back(turns[last].label);
+              turn.wave = std::max(turn.wave, turns[last].wave + 1);
+            }
+            last = number;
           }
         }
       }
-      std::size_t wave = 0;
-      for (const int tile : tiles) wave = std::max(wave, next[tile]);
-      for (const int tile : tiles) next[tile] = wave + 1;
-      if (wave == waves.size()) waves.emplace_back();
-      waves[wave].push_back(static_cast<int>(label));
+      turns.push_back(std::move(turn));
     }
-    return waves;
+    std::stable_sort(turns.begin(), turns.end(), [&](const Turn& a, const Turn& b) {
+      return a.wave != b.wave ? a.wave < b.wave
+                              : pixels_[a.label].size() > pixels_[b.label].size();
+    });
+    return turns;
   }
 
   // Lets one copy grow over its neighbours to where the cost of all seams is least.
