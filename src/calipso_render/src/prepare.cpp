@@ -212,6 +212,7 @@ Prepared prepare(const ClipSample& as_taken, const std::vector<ObjectModel>& mod
   cv::Mat steadiness;
   const cv::Mat picture = steadyKeyFrame(frames, movingIn(frames.front().labels, p), steadiness);
   p.outline_blur = outlineBlur(picture, p.key_labels);
+  p.colour_blur = colourBlur(picture, p.key_labels);
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   Stopwatch watch;
   Background seen = seenBackground(frames, any_moves, params.background);

@@ -72,6 +72,52 @@ TEST(OutlineBlur, IsTheUsualOneWithoutContrast) {
   EXPECT_EQ(outlineBlur(noise, cv::Mat::zeros(labels.size(), CV_8U)), 0.3f);
 }
 
+// Colours as a video codec leaves them: blurred beside their luma.
+cv::Mat withSoftColours(const cv::Mat& codes, float blur) {
+  cv::Mat soft, out = codes.clone();
+  cv::GaussianBlur(codes, soft, {0, 0}, blur);
+  for (int v = 0; v < codes.rows; ++v) {
+    for (int u = 0; u < codes.cols; ++u) {
+      const cv::Vec3f &c = codes.at<cv::Vec3f>(v, u), &s = soft.at<cv::Vec3f>(v, u);
+      out.at<cv::Vec3f>(v, u) = s + cv::Vec3f::all(lumaOf(c) - lumaOf(s));
+    }
+  }
+  return out;
+}
+
+TEST(ColourBlur, IsThatOfThePicturesColours) {
+  for (const float blur : {0.5f, 1.0f, 1.5f}) {
+    cv::Mat labels;
+    cv::Mat picture = disc(0.0f, labels);
+    for (cv::Vec3f& c : cv::Mat_<cv::Vec3f>(picture)) c[0] *= 0.6f;  // yellow
+    EXPECT_NEAR(colourBlur(withSoftColours(picture, blur), labels), blur, 0.2f) << blur;
+    EXPECT_LT(outlineBlur(withSoftColours(picture, blur), labels), 0.35f) << blur;
+  }
+}
+
+TEST(ColourBlur, IsNotToldByGrey) {
+  cv::Mat labels;
+  const cv::Mat picture = disc(1.0f, labels);
+  EXPECT_EQ(colourBlur(picture, labels), 0.0f);
+}
+
+// CV_8UC1: 1 where the objects are, as `input` has them.
+cv::Mat labelsOf(const FrameInput& input, const Prepared& prepared) {
+  const Actor now = makeActor(prepared.surfaces[0], input.objects[0].vertices, input.camera);
+  const VisibilityBuffer seen({0, 0, kWidth, kHeight}, {&now.screen});
+  cv::Mat labels = cv::Mat::zeros(kHeight, kWidth, CV_8U);
+  for (int v = 0; v < kHeight; ++v)
+    for (int u = 0; u < kWidth; ++u)
+      if (seen.idAt(u, v) != VisibilityBuffer::kNothing) labels.at<std::uint8_t>(v, u) = 1;
+  return labels;
+}
+
+cv::Mat drawnBy(Renderer& renderer, const FrameInput& input) {
+  cv::Mat codes;
+  renderer.composite(input).bgr.convertTo(codes, CV_32F);
+  return codes;
+}
+
 // A ball that is moved in a blurred picture has an outline as soft as before; one that stays is the
 // picture's, to the byte.
 TEST(Renderer, DrawnOutlinesAreAsSoftAsTheVideos) {
@@ -88,19 +134,10 @@ TEST(Renderer, DrawnOutlinesAreAsSoftAsTheVideos) {
   sharp->outline_blur = 0.0f;
 
   const FrameInput moved = ballMovedLeft(key, *prepared);
-  const Actor now = makeActor(prepared->surfaces[0], moved.objects[0].vertices, key.camera);
-  const VisibilityBuffer seen({0, 0, kWidth, kHeight}, {&now.screen});
-  cv::Mat labels = cv::Mat::zeros(kHeight, kWidth, CV_8U);
-  for (int v = 0; v < kHeight; ++v)
-    for (int u = 0; u < kWidth; ++u)
-      if (seen.idAt(u, v) != VisibilityBuffer::kNothing) labels.at<std::uint8_t>(v, u) = 1;
-  const auto blurDrawnBy = [&](Renderer& renderer) {
-    cv::Mat codes;
-    renderer.composite(moved).bgr.convertTo(codes, CV_32F);
-    return outlineBlur(codes, labels);
-  };
+  const cv::Mat labels = labelsOf(moved, *prepared);
   Renderer renderer(prepared, params()), sharp_renderer(sharp, params());
-  const float soft = blurDrawnBy(renderer), hard = blurDrawnBy(sharp_renderer);
+  const float soft = outlineBlur(drawnBy(renderer, moved), labels),
+              hard = outlineBlur(drawnBy(sharp_renderer, moved), labels);
   // The texture is of the blurred picture, which adds to both.
   EXPECT_GT(soft, 0.9f * prepared->outline_blur);
   EXPECT_LT(soft, 1.5f * prepared->outline_blur);
@@ -109,6 +146,34 @@ TEST(Renderer, DrawnOutlinesAreAsSoftAsTheVideos) {
   FrameInput still = moved;
   still.objects[0].vertices = prepared->surfaces[0].key_vertices;
   EXPECT_EQ(cv::norm(renderer.composite(still).bgr, key.bgr, cv::NORM_INF), 0.0);
+}
+
+TEST(Renderer, DrawnColoursAreAsSoftAsTheVideos) {
+  const ObjectModel ball = ballAt(kCentre);
+  ClipFrame key = frameWithBall(ball);
+  cv::Mat codes;
+  key.bgr.convertTo(codes, CV_32F);
+  for (int v = 0; v < kHeight; ++v)
+    for (int u = 0; u < kWidth; ++u)
+      if (key.labels.at<std::uint8_t>(v, u) != 0) codes.at<cv::Vec3f>(v, u)[0] *= 0.5f;
+  withSoftColours(codes, 1.3f).convertTo(key.bgr, CV_8U);
+  ClipSample clip;
+  clip.add(key);
+  const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ball}, params()));
+  ASSERT_NEAR(prepared->colour_blur, 1.3f, 0.3f);
+  auto crisp = std::make_shared<Prepared>(*prepared);
+  crisp->colour_blur = 0.0f;
+
+  const FrameInput moved = ballMovedLeft(key, *prepared);
+  const cv::Mat labels = labelsOf(moved, *prepared);
+  Renderer renderer(prepared, params()), crisp_renderer(crisp, params());
+  const cv::Mat soft = drawnBy(renderer, moved), hard = drawnBy(crisp_renderer, moved);
+  EXPECT_NEAR(colourBlur(soft, labels), prepared->colour_blur, 0.4f);
+  EXPECT_LT(colourBlur(hard, labels), 0.6f * prepared->colour_blur);
+  // Their brightness is what it was.
+  cv::Mat differs;
+  cv::transform(soft - hard, differs, cv::Matx13f(0.114f, 0.587f, 0.299f));
+  EXPECT_LE(cv::norm(differs, cv::NORM_INF), 1.5);
 }
 
 }  // namespace

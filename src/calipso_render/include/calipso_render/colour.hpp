@@ -43,4 +43,9 @@ inline float luminance(const cv::Vec3f& c) {
 // The same of a picture of code values. @param codes CV_32FC3 @return CV_32FC1
 cv::Mat luminanceOf(const cv::Mat& codes);
 
+// Rec. 601 luma of B, G, R code values: what video codecs keep apart from colours.
+inline float lumaOf(const cv::Vec3f& code) {
+  return 0.114f * code[0] + 0.587f * code[1] + 0.299f * code[2];
+}
+
 }  // namespace calipso::render

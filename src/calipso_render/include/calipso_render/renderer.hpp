@@ -118,7 +118,8 @@ struct Prepared {
   cv::Vec3f umbra = {0.4f, 0.4f,
                      0.4f};  // what the sun's absence leaves of a support plane's brightness
   NoiseModel noise;
-  float outline_blur = 0.0f;  // px: how much softer than a pixel the video's outlines are
+  float outline_blur = 0.0f;  // px: how much softer than a pixel the video's outlines are,
+  float colour_blur = 0.0f;   // ... their colours beside their brightness
   int light_views = 1, texture_views = 1;  // frames that light and texture come from
   double background_ms = 0.0,
          appearance_ms = 0.0;        // wall time that plate, and light with appearances, took

@@ -23,12 +23,14 @@ constexpr float kUsual = 0.3f;  // px: what lenses and pixels that overlap do; f
 // quantiles of the places' widths, and how much softer the one may be than the other
 constexpr double kQuantile = 0.25, kSharp = 0.1;
 constexpr float kSofter = 1.5f;
+constexpr float kBeside = 2.5f;  // px from an outline: colours are those of what lies there
 constexpr float kPixel = 0.288675f;  // standard deviation of a pixel's own width, px
 constexpr float kFinest = 1.15f;     // factor between the widths that are tried
 constexpr float kWidest = 3.0f;      // px
 
 struct Sample {
-  float across, value;  // px outwards; linear brightness
+  float across, value;  // px outwards; from 0 to 1
+  cv::Point at;
 };
 
 // R.m.s. of what a step at `edge`, `width` wide, leaves of the samples, over its height.
@@ -56,16 +58,40 @@ std::optional<float> widthOf(const std::vector<Sample>& samples) {
   return width > 0.0f ? std::make_optional(width) : std::nullopt;
 }
 
+// Linear.
+float brightnessAt(const cv::Mat& picture, const cv::Point& p) {
+  const cv::Vec3f& code = picture.at<cv::Vec3f>(p);
+  return luminance(
+      {linearFromRealCode(code[0]), linearFromRealCode(code[1]), linearFromRealCode(code[2])});
+}
+
+// A colour beside its brightness, code values.
+cv::Vec3f hueAt(const cv::Mat& picture, const cv::Point& p) {
+  const cv::Vec3f& code = picture.at<cv::Vec3f>(p);
+  return code - cv::Vec3f::all(lumaOf(code));
+}
+
+// What lies along an outline makes it look softer, never sharper. @param widths sorted
+float blurOf(const std::vector<float>& widths) {
+  const auto blurAt = [&](double part) {
+    const float width = widths[static_cast<std::size_t>(part * widths.size())];
+    return std::sqrt(std::max(width * width - kPixel * kPixel, 0.0f));
+  };
+  return std::min(blurAt(kQuantile), std::max(kUsual, kSofter * blurAt(kSharp)));
+}
+
 class Outlines {
  public:
-  Outlines(const cv::Mat& picture, const cv::Mat& labels) : picture_(picture), labels_(labels) {
+  explicit Outlines(const cv::Mat& labels) : labels_(labels) {
     cv::Mat mask = labels != 0;
     mask.convertTo(mask, CV_32F, 1.0 / 255.0);
     cv::GaussianBlur(mask, mask, {0, 0}, 2.0);
     cv::Sobel(mask, along_u_, CV_32F, 1, 0), cv::Sobel(mask, along_v_, CV_32F, 0, 1);
   }
 
-  std::vector<float> widths() const {
+  // Sorted. @param valuesOf sets the values of the samples around a place
+  template <class Values>
+  std::vector<float> widths(const Values& valuesOf) const {
     std::vector<std::vector<cv::Point>> outlines;
     cv::findContours(labels_ != 0, outlines, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
     std::vector<cv::Point> places;
@@ -73,10 +99,15 @@ class Outlines {
       for (std::size_t i = 0; i < outline.size(); i += kStride) places.push_back(outline[i]);
     std::vector<std::optional<float>> widths(places.size());
 #pragma omp parallel for schedule(dynamic, 8)
-    for (std::size_t i = 0; i < places.size(); ++i) widths[i] = widthOf(samplesAt(places[i]));
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      std::vector<Sample> samples = samplesAt(places[i]);
+      valuesOf(samples);
+      widths[i] = widthOf(samples);
+    }
     std::vector<float> found;
     for (const std::optional<float>& width : widths)
       if (width) found.push_back(*width);
+    std::sort(found.begin(), found.end());
     return found;
   }
 
@@ -95,16 +126,12 @@ class Outlines {
         const Eigen::Vector2f off(static_cast<float>(u - place.x), static_cast<float>(v - place.y));
         const float across = n.dot(off), along = n.x() * off.y() - n.y() * off.x();
         if (std::abs(across) > kAcross || std::abs(along) > kAlong) continue;
-        const cv::Vec3f& code = picture_.at<cv::Vec3f>(v, u);
-        samples.push_back(
-            {across, luminance({linearFromRealCode(code[0]), linearFromRealCode(code[1]),
-                                linearFromRealCode(code[2])})});
+        samples.push_back({across, 0.0f, {u, v}});
       }
     }
     return samples;
   }
 
-  const cv::Mat& picture_;
   const cv::Mat& labels_;
   cv::Mat along_u_, along_v_;  // CV_32FC1: gradient of the blurred mask
 };
@@ -112,15 +139,24 @@ class Outlines {
 }  // namespace
 
 float outlineBlur(const cv::Mat& picture, const cv::Mat& labels) {
-  std::vector<float> widths = Outlines(picture, labels).widths();
-  if (widths.size() < kFewest) return kUsual;
-  std::sort(widths.begin(), widths.end());
-  const auto blurAt = [&](double part) {
-    const float width = widths[static_cast<std::size_t>(part * widths.size())];
-    return std::sqrt(std::max(width * width - kPixel * kPixel, 0.0f));
-  };
-  // What lies along an outline makes it look softer, never sharper.
-  return std::min(blurAt(kQuantile), std::max(kUsual, kSofter * blurAt(kSharp)));
+  const std::vector<float> widths = Outlines(labels).widths([&](std::vector<Sample>& samples) {
+    for (Sample& s : samples) s.value = brightnessAt(picture, s.at);
+  });
+  return widths.size() < kFewest ? kUsual : blurOf(widths);
+}
+
+float colourBlur(const cv::Mat& picture, const cv::Mat& labels) {
+  const std::vector<float> widths = Outlines(labels).widths([&](std::vector<Sample>& samples) {
+    cv::Vec3f change;  // from inside to outside
+    for (const Sample& s : samples) {
+      if (std::abs(s.across) > kBeside)
+        change += std::copysign(1.0f, s.across) * hueAt(picture, s.at);
+    }
+    const auto length = static_cast<float>(cv::norm(change));
+    for (Sample& s : samples)
+      s.value = length > 0.0f ? hueAt(picture, s.at).dot(change) / (255.0f * length) : 0.0f;
+  });
+  return widths.size() < kFewest ? 0.0f : blurOf(widths);
 }
 
 }  // namespace calipso::render

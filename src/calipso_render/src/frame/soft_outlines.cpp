@@ -31,20 +31,39 @@ std::vector<float> partsOf(float deviation) {
   return parts;
 }
 
-cv::Vec3f blurredAt(const cv::Mat& bgr, int u, int v, const std::vector<float>& parts) {
+// Sum of what `at` tells of the pixels around (u, v), by their parts.
+template <class At>
+cv::Vec3f blurred(const cv::Mat& bgr, int u, int v, const std::vector<float>& parts, const At& at) {
   const int reach = static_cast<int>(parts.size()) - 1;
-  const float* linear = decodeTable();
   cv::Vec3f sum;
   for (int dv = -reach; dv <= reach; ++dv) {
     const cv::Vec3b* row = bgr.ptr<cv::Vec3b>(std::clamp(v + dv, 0, bgr.rows - 1));
     cv::Vec3f line;
-    for (int du = -reach; du <= reach; ++du) {
-      const cv::Vec3b& code = row[std::clamp(u + du, 0, bgr.cols - 1)];
-      line += parts[std::abs(du)] * cv::Vec3f(linear[code[0]], linear[code[1]], linear[code[2]]);
-    }
+    for (int du = -reach; du <= reach; ++du)
+      line += parts[std::abs(du)] * at(row[std::clamp(u + du, 0, bgr.cols - 1)]);
     sum += parts[std::abs(dv)] * line;
   }
   return sum;
+}
+
+// A pixel as soft as lens and pixels make it, in linear light. @return code values
+cv::Vec3f softened(const cv::Mat& bgr, int u, int v, float part, const std::vector<float>& parts) {
+  const float* linear = decodeTable();
+  const cv::Vec3f now = linearPixel(bgr, u, v),
+                  soft = blurred(bgr, u, v, parts, [&](const cv::Vec3b& code) {
+                    return cv::Vec3f(linear[code[0]], linear[code[1]], linear[code[2]]);
+                  });
+  const cv::Vec3f mixed = now + part * (soft - now);
+  return {codeFromLinear(mixed[0]), codeFromLinear(mixed[1]), codeFromLinear(mixed[2])};
+}
+
+// A pixel of its own luma with the colours around it, as codecs keep them. @return code values
+cv::Vec3f recoloured(const cv::Mat& bgr, int u, int v, float part,
+                     const std::vector<float>& parts) {
+  const cv::Vec3f now = bgr.at<cv::Vec3b>(v, u),
+                  soft = blurred(bgr, u, v, parts,
+                                 [](const cv::Vec3b& code) { return cv::Vec3f(code); });
+  return now + part * ((soft - cv::Vec3f::all(lumaOf(soft))) - (now - cv::Vec3f::all(lumaOf(now))));
 }
 
 // How much of its softness an outline lacks: none where the surface is where the video has it, as
@@ -75,35 +94,45 @@ cv::Mat findOutlines(const StagedFrame& frame, const DrawnSurfaces& surfaces, in
   return lacking;
 }
 
-}  // namespace
+using Softening = cv::Vec3f (*)(const cv::Mat& bgr, int u, int v, float part,
+                                const std::vector<float>& parts);
 
-void softenOutlines(const StagedFrame& frame, const DrawnSurfaces& surfaces, FrameOutput& out) {
-  if (frame.prepared.outline_blur < kLeast) return;
+// Softens what is near the outlines.
+// @param blur px, standard deviation
+void soften(const StagedFrame& frame, const DrawnSurfaces& surfaces, float blur,
+            Softening softening, FrameOutput& out) {
+  if (blur < kLeast) return;
   const cv::Rect region = surfaces.centre().region();
-  const std::vector<float> parts = partsOf(frame.prepared.outline_blur);
+  const std::vector<float> parts = partsOf(blur);
   const cv::Mat lacking = findOutlines(frame, surfaces, static_cast<int>(parts.size()) - 1);
-  std::vector<std::vector<std::pair<int, cv::Vec3b>>> softened(region.height);
+  std::vector<std::vector<std::pair<int, cv::Vec3b>>> changed(region.height);
 #pragma omp parallel for schedule(dynamic, 8)
   for (int j = 0; j < region.height; ++j) {
     const std::uint8_t* lacks = lacking.ptr(j);
     for (int i = 0; i < region.width; ++i) {
       if (lacks[i] == 0) continue;
       const int u = i + region.x, v = j + region.y;
-      const float part = lacks[i] / 255.0f;
-      const cv::Vec3f now = linearPixel(out.bgr, u, v),
-                      soft = now + part * (blurredAt(out.bgr, u, v, parts) - now);
-      cv::Vec3b code;
-      for (int c = 0; c < 3; ++c) code[c] = quantise(codeFromLinear(soft[c]));
-      if (code != out.bgr.at<cv::Vec3b>(v, u)) softened[j].push_back({u, code});
+      const cv::Vec3f soft = softening(out.bgr, u, v, lacks[i] / 255.0f, parts);
+      const cv::Vec3b code(quantise(soft[0]), quantise(soft[1]), quantise(soft[2]));
+      if (code != out.bgr.at<cv::Vec3b>(v, u)) changed[j].push_back({u, code});
     }
   }
   for (int j = 0; j < region.height; ++j) {
-    for (const auto& [u, code] : softened[j]) {
+    for (const auto& [u, code] : changed[j]) {
       out.bgr.at<cv::Vec3b>(j + region.y, u) = code;
       std::uint8_t& source = out.provenance.at<std::uint8_t>(j + region.y, u);
       if (source == kOriginal) source = kRendered;
     }
   }
+}
+
+}  // namespace
+
+void softenOutlines(const StagedFrame& frame, const DrawnSurfaces& surfaces, FrameOutput& out) {
+  const float blur = frame.prepared.outline_blur, colour = frame.prepared.colour_blur;
+  soften(frame, surfaces, blur, softened, out);
+  soften(frame, surfaces, std::sqrt(std::max(0.0f, colour * colour - blur * blur)), recoloured,
+         out);
 }
 
 }  // namespace calipso::render
