@@ -133,6 +133,7 @@ DrawingCase makeDrawingCase(Quality quality) {
   auto prepared = std::make_shared<Prepared>(prepare(clip, {model}, c.params));
   prepared->light.light = caseLight();
   prepared->shadowless = cv::Mat::zeros(key.labels.size(), CV_8U);
+  prepared->colour_blur = 1.0f;  // as video codecs leave it
   c.prepared = prepared;
   c.frame = key.bgr;
   c.coverage = static_cast<double>(cv::countNonZero(key.labels)) / key.labels.total();
