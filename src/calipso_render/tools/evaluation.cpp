@@ -33,10 +33,6 @@ double elapsedMs(std::chrono::steady_clock::time_point since) {
       .count();
 }
 
-void keepLowest(std::optional<double>& lowest, std::optional<double> value) {
-  if (value && (!lowest || *value < *lowest)) lowest = value;
-}
-
 // Of what is edited.
 cv::Mat maskOf(const FrameInput& in, const std::vector<Surface>& surfaces) {
   cv::Mat mask = cv::Mat::zeros(in.labels.size(), CV_8U);
@@ -220,7 +216,7 @@ class Evaluation {
     const auto everything = [](std::size_t, ObjectInFrame& o) { o.edited = true; };
     const FrameInput in = frame(0, everything);
     const cv::Mat mask = in.labels != 0, inside = shrink(mask, kRim),
-                  seam = grow(mask, kSeam) & ~shrink(mask, kSeam);
+                  seam = rim(mask, kSeam);
     const cv::Mat kept = Renderer(prepared_, params_).composite(in).bgr;
     const cv::Mat drawn = Renderer(prepared_, without(false, false)).composite(in).bgr;
     picture("undeformed", drawn);
@@ -300,7 +296,7 @@ class Evaluation {
   }
 
   void judgeMoved() {
-    std::optional<double> moved, around, copied, gain, turned_gain, from_clip;
+    std::optional<double> moved, around, seam, copied, gain, turned_gain, from_clip, clip_seam;
     const RenderParams bare = without(false, false);
     Renderer renderer(fromKeyFrame(), bare), clip_renderer(prepared_, bare), copier(unlit(), bare);
     for (int k = kMovedFirst; k < scene_.frame_count; k += kMovedStep) {
@@ -322,13 +318,17 @@ class Evaluation {
       if (relit && copy && turnedBy(k) >= kTurned) keepLowest(turned_gain, *relit - *copy);
       const cv::Mat with_clip = clip_renderer.composite(in).bgr;
       keepLowest(from_clip, psnr(with_clip, in.bgr, inside));
+      keepLowest(seam, psnr(drawn, in.bgr, rim(mask, kSeam)));
+      keepLowest(clip_seam, psnr(with_clip, in.bgr, rim(mask, kSeam)));
       picture("clip_moved_" + std::to_string(k), with_clip);
       keepLowest(around, psnr(drawn, in.bgr, grow(mask, kAround) & ~grow(mask, 2)));
       picture("moved_" + std::to_string(k), drawn);
     }
     put("moved_psnr_db", moved);
     put("shadow_psnr_db", around);
+    put("moved_seam_psnr_db", seam);
     put("moved_from_clip_psnr_db", from_clip);
+    put("moved_seam_from_clip_psnr_db", clip_seam);
     put("moved_copied_psnr_db", copied);
     put("relighting_gain_db", gain);
     put("relighting_gain_turned_db", turned_gain);

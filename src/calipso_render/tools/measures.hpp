@@ -23,5 +23,9 @@ std::optional<double> albedoError(const cv::Mat& albedo, const cv::Mat& truth, c
 
 cv::Mat grow(const cv::Mat& mask, int radius);
 cv::Mat shrink(const cv::Mat& mask, int radius);
+// What lies within `radius` px of its outline.
+cv::Mat rim(const cv::Mat& mask, int radius);
+
+void keepLowest(std::optional<double>& lowest, std::optional<double> value);
 
 }  // namespace calipso::render
