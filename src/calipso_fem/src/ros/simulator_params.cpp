@@ -74,7 +74,6 @@ SimulatorParams loadSimulatorParams(const ros::NodeHandle& pnh) {
   if (p.colour_by != "von_mises" && p.colour_by != "displacement")
     throw std::invalid_argument("parameter colour_by = '" + p.colour_by +
                                 "'; must be von_mises or displacement");
-  p.force_scale = optionalParam(pnh, "force_scale", p.force_scale);
   WorldParams& w = p.world;
   w.pixel_error = optionalParam(pnh, "pixel_error", w.pixel_error);
   w.max_nodes = optionalParam(pnh, "max_nodes", w.max_nodes);

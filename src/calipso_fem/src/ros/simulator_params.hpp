@@ -14,7 +14,6 @@ struct SimulatorParams {
   std::string scene_directory;
   Mode mode = Mode::kBag;
   std::string colour_by = "von_mises";  // or displacement
-  double force_scale = 0.05;            // m of arrow per N
   WorldParams world;
 };
 

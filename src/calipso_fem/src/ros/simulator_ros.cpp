@@ -250,7 +250,7 @@ void SimulatorRos::publish(const std::vector<EditOutcome>& outcomes, const ros::
   reporter_.timing(stamp, state.step_ms);
   sendRigidTransforms(state, stamp);
   if (markers_.getNumSubscribers() > 0)
-    markers_.publish(toMarkers(*world_, {params_.colour_by, params_.force_scale}, stamp));
+    markers_.publish(toMarkers(*world_, params_.colour_by, stamp));
 }
 
 // A world that is made anew says once more what the one before it has said.

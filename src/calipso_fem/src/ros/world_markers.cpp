@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "calipso_ros/conversions.hpp"
 #include "calipso_ros/topics.hpp"
@@ -55,86 +56,116 @@ Eigen::VectorXd surfaceValue(const ObjectSnapshot& s, const WorldObject& object,
   return largest > 0.0 ? Eigen::VectorXd(value / largest) : value;
 }
 
-Marker surfaceMarker(const ObjectSnapshot& s, const WorldObject& object, const MarkerStyle& style,
-                     const ros::Time& stamp) {
+// Without values it has one colour, which rviz shades.
+Marker surfaceMarker(const ObjectSnapshot& s, const WorldObject& object,
+                     const std::string& colour_by, const ros::Time& stamp) {
   Marker m = markerOf("surface", s.index, Marker::TRIANGLE_LIST, stamp);
-  if (s.removed) {
-    m.action = Marker::DELETE;
-    return m;
-  }
-  const Eigen::VectorXd value = surfaceValue(s, object, style.colour_by);
+  const Eigen::VectorXd value = surfaceValue(s, object, colour_by);
   for (int f = 0; f < object.mesh.triangleCount(); ++f)
     for (int k = 0; k < 3; ++k) {
       const int v = object.mesh.triangles(f, k);
       const Eigen::Vector3d p = s.vertices.rows() ? Eigen::Vector3d(s.vertices.row(v).transpose())
                                                   : s.world_from_object * object.mesh.vertex(v);
       m.points.push_back(toPointMsg(p));
-      m.colors.push_back(value.size() ? heat(value[v]) : m.color);
+      if (value.size()) m.colors.push_back(heat(value[v]));
     }
   return m;
 }
 
-Marker arrow(const std::string& ns, int id, const Eigen::Vector3d& from, const Eigen::Vector3d& by,
-             const std_msgs::ColorRGBA& c, const ros::Time& stamp) {
-  Marker m = markerOf(ns, id, Marker::ARROW, stamp);
-  m.points = {toPointMsg(from), toPointMsg(from + by)};
-  m.scale.x = 0.06 * by.norm();  // shaft
-  m.scale.y = 0.12 * by.norm();  // head
-  m.scale.z = 0.0;
-  m.color = c;
-  return m;
+// What drawings of one object are measured by: scenes are of centimetres or of hundreds of metres.
+struct Measure {
+  double size = 0.0;    // m
+  double weight = 0.0;  // N, on earth; 0: nothing moves it
+};
+
+std::map<std::string, Measure> measuresOf(const World& world,
+                                          const std::vector<World::Drawing>& drawings) {
+  constexpr double kEarth = 9.81;  // m/s^2
+  std::map<std::string, Measure> measures;
+  for (const WorldObject& object : world.scene().objects)
+    measures[object.name].size = boundingDiagonal(object.mesh);
+  for (const World::Drawing& drawing : drawings)
+    if (std::isfinite(drawing.mass)) measures[drawing.object].weight = kEarth * drawing.mass;
+  return measures;
 }
 
-// Removes what an earlier message drew in a namespace whose number of markers changes.
-Marker clear(const std::string& ns, const ros::Time& stamp) {
-  Marker m = markerOf(ns, 0, Marker::CUBE, stamp);
+// The lighter of two that touch, as it is the one that a force between them moves.
+Measure lighterOf(const Measure& a, const Measure& b) {
+  if (a.weight <= 0.0 || b.weight <= 0.0) return b.weight > 0.0 ? b : a;
+  return a.weight < b.weight ? a : b;
+}
+
+// A force of the object's weight is half as long as the object, and none is longer than it. Without
+// a length there is none: rviz takes it for an error.
+void addArrow(const std::string& ns, int id, const Eigen::Vector3d& from,
+              const Eigen::Vector3d& force, const Measure& on, const std_msgs::ColorRGBA& c,
+              const ros::Time& stamp, std::vector<Marker>& markers) {
+  const double size = force.norm(), length = on.size * size / (size + on.weight);
+  if (!(length > 1e-3 * on.size)) return;
+  Marker m = markerOf(ns, id, Marker::ARROW, stamp);
+  m.points = {toPointMsg(from), toPointMsg(from + length / size * force)};
+  m.scale.x = 0.06 * length;  // shaft
+  m.scale.y = 0.12 * length;  // head
+  m.scale.z = 0.0;
+  m.color = c;
+  markers.push_back(m);
+}
+
+// Takes away all that was drawn before, the models as aligned included: rviz minds no namespace.
+Marker clearAll(const ros::Time& stamp) {
+  Marker m = markerOf("surface", 0, Marker::CUBE, stamp);
   m.action = Marker::DELETEALL;
   return m;
 }
 
-double sizeOf(const World& world) {
-  double size = 0.0;
-  for (const WorldObject& object : world.scene().objects)
-    size = std::max(size, boundingDiagonal(object.mesh));
-  return size > 0.0 ? size : 1.0;
+void addGrid(const World::Drawing& drawing, double size, int id, const ros::Time& stamp,
+             std::vector<Marker>& markers) {
+  Marker grid = markerOf("volume_grid", id, Marker::LINE_LIST, stamp);
+  grid.scale.x = 0.001 * size;
+  grid.color = colour(0.2, 0.6, 1.0, 0.5);
+  for (const auto& p : drawing.edges) grid.points.push_back(toPointMsg(p));
+  Marker fixed = markerOf("fixed_nodes", id, Marker::SPHERE_LIST, stamp);
+  fixed.scale.x = fixed.scale.y = fixed.scale.z = 0.02 * size;
+  fixed.color = colour(1.0, 0.8, 0.0);
+  for (const auto& p : drawing.fixed) fixed.points.push_back(toPointMsg(p));
+  for (Marker* m : {&grid, &fixed})
+    if (!m->points.empty()) markers.push_back(*m);
 }
 
-void addDrawings(const World& world, const MarkerStyle& style, const ros::Time& stamp,
+void addDrawings(const World& world, const WorldState& state, const ros::Time& stamp,
                  std::vector<Marker>& markers) {
-  const double size = sizeOf(world);
-  int id = 0;
-  for (const World::Drawing& drawing : world.drawings()) {
-    Marker grid = markerOf("volume_grid", ++id, Marker::LINE_LIST, stamp);
-    grid.scale.x = 0.001 * size;
-    grid.color = colour(0.2, 0.6, 1.0, 0.5);
-    for (const auto& p : drawing.edges) grid.points.push_back(toPointMsg(p));
-    Marker fixed = markerOf("fixed_nodes", id, Marker::SPHERE_LIST, stamp);
-    fixed.scale.x = fixed.scale.y = fixed.scale.z = 0.02 * size;
-    fixed.color = colour(1.0, 0.8, 0.0);
-    for (const auto& p : drawing.fixed) fixed.points.push_back(toPointMsg(p));
-    for (Marker* m : {&grid, &fixed})
-      if (!m->points.empty()) markers.push_back(*m);
-    int arrows = 0;
+  const std::vector<World::Drawing> drawings = world.drawings();
+  const std::map<std::string, Measure> measures = measuresOf(world, drawings);
+  const auto measureOf = [&](const std::string& object) {
+    const auto found = measures.find(object);
+    return found == measures.end() ? Measure{} : found->second;  // a support has none
+  };
+  int id = 0, arrows = 0, contacts = 0;
+  for (const World::Drawing& drawing : drawings) {
+    const Measure measure = measureOf(drawing.object);
+    addGrid(drawing, measure.size, ++id, stamp, markers);
     for (const auto& [point, force] : drawing.forces)
-      markers.push_back(arrow("forces", 100 * id + arrows++, point, style.force_scale * force,
-                              colour(1.0, 0.1, 0.6), stamp));
+      addArrow("forces", ++arrows, point, force, measure, colour(1.0, 0.1, 0.6), stamp, markers);
   }
+  for (const ContactPoint& c : state.contacts)
+    addArrow("contacts", ++contacts, c.position, c.force, lighterOf(measureOf(c.a), measureOf(c.b)),
+             c.first_touch ? colour(1, 0, 0) : colour(0.1, 0.9, 0.3), stamp, markers);
 }
 
-void addContacts(const WorldState& state, const MarkerStyle& style, const ros::Time& stamp,
-                 std::vector<Marker>& markers) {
-  int id = 0;
-  for (const ContactPoint& c : state.contacts)
-    markers.push_back(arrow("contacts", ++id, c.position, style.force_scale * c.force,
-                            c.first_touch ? colour(1, 0, 0) : colour(0.1, 0.9, 0.3), stamp));
+// A box around all objects.
+Eigen::AlignedBox3d boundsOf(const World& world) {
+  Eigen::AlignedBox3d bounds;
+  for (const WorldObject& object : world.scene().objects)
+    for (int i = 0; i < object.mesh.vertexCount(); ++i)
+      bounds.extend(object.world_from_object * object.mesh.vertex(i));
+  return bounds;
 }
 
 void addSupports(const World& world, const ros::Time& stamp, std::vector<Marker>& markers) {
-  const double half = 5.0 * sizeOf(world);
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const WorldObject& object : world.scene().objects)
-    middle +=
-        object.world_from_object.translation() / static_cast<double>(world.scene().objects.size());
+  const Eigen::AlignedBox3d bounds = boundsOf(world);
+  if (bounds.isEmpty()) return;
+  const Eigen::Vector3d middle = bounds.center();
+  const double width = 4.0 * bounds.diagonal().norm();
   int id = 0;
   for (const SupportPlane& plane : world.scene().planes) {
     Marker m = markerOf("support", ++id, Marker::CUBE, stamp);
@@ -143,8 +174,8 @@ void addSupports(const World& world, const ros::Time& stamp, std::vector<Marker>
                         .toRotationMatrix();
     pose.translation() = middle - (plane.normal.dot(middle) - plane.offset) * plane.normal;
     m.pose = calipso::toMsg(pose);
-    m.scale.x = m.scale.y = 2.0 * half;
-    m.scale.z = 1e-3 * half;
+    m.scale.x = m.scale.y = width;
+    m.scale.z = 1e-3 * width;
     m.color = colour(0.6, 0.6, 0.6, 0.3);
     markers.push_back(m);
   }
@@ -152,17 +183,16 @@ void addSupports(const World& world, const ros::Time& stamp, std::vector<Marker>
 
 }  // namespace
 
-visualization_msgs::MarkerArray toMarkers(const World& world, const MarkerStyle& style,
+visualization_msgs::MarkerArray toMarkers(const World& world, const std::string& colour_by,
                                           const ros::Time& stamp) {
   visualization_msgs::MarkerArray array;
   const WorldState state = world.state();
-  for (const char* ns : {"volume_grid", "fixed_nodes", "forces", "contacts"})
-    array.markers.push_back(clear(ns, stamp));
+  array.markers.push_back(clearAll(stamp));
   for (size_t k = 0; k < state.objects.size(); ++k)
-    array.markers.push_back(
-        surfaceMarker(state.objects[k], world.scene().objects[k], style, stamp));
-  addDrawings(world, style, stamp, array.markers);
-  addContacts(state, style, stamp, array.markers);
+    if (!state.objects[k].removed)
+      array.markers.push_back(
+          surfaceMarker(state.objects[k], world.scene().objects[k], colour_by, stamp));
+  addDrawings(world, state, stamp, array.markers);
   addSupports(world, stamp, array.markers);
   return array;
 }

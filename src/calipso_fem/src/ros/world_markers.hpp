@@ -9,14 +9,10 @@
 
 namespace calipso::fem {
 
-struct MarkerStyle {
-  std::string colour_by = "von_mises";  // or displacement
-  double force_scale = 0.05;            // m per N
-};
-
 // Everything the simulator shows in rviz, one namespace per kind of thing: surface, volume grid,
-// fixed nodes, forces, contacts, support. Frame: the world.
-visualization_msgs::MarkerArray toMarkers(const World& world, const MarkerStyle& style,
+// fixed nodes, forces, contacts, support; each as large as suits its object. Frame: the world.
+// colour_by: what colours surfaces, von_mises or displacement
+visualization_msgs::MarkerArray toMarkers(const World& world, const std::string& colour_by,
                                           const ros::Time& stamp);
 
 }  // namespace calipso::fem

@@ -6,6 +6,12 @@
 namespace calipso::fem {
 namespace {
 
+// kg; 0: it is not simulated.
+double massAsSimulated(const Actor& actor) {
+  if (actor.soft) return actor.soft->body().totalMass();
+  return actor.kind == ObjectKind::kRigid ? massOf(actor) : 0.0;
+}
+
 PlanEntry entryOf(const Actor& actor, double time_step) {
   PlanEntry e;
   e.object = actor.object.name;
@@ -14,6 +20,7 @@ PlanEntry entryOf(const Actor& actor, double time_step) {
   e.reason = actor.reason + (note.empty() ? "" : " (" + note + ")");
   e.material = actor.material;
   e.time_step = time_step;
+  e.mass = massAsSimulated(actor);
   if (actor.soft) {
     const DeformableBody& body = actor.soft->body();
     e.nodes = body.nodeCount();
@@ -22,12 +29,10 @@ PlanEntry entryOf(const Actor& actor, double time_step) {
     e.material_model = toString(body.options().material_model);
     e.solver = toString(body.options().solver);
     e.cell_size = body.grid().cell_size;
-    e.mass = body.totalMass();
     e.ms_per_frame = actor.soft_ms;
   } else if (actor.kind == ObjectKind::kRigid) {
     e.element = "convex hull";
     e.solver = "Bullet";
-    e.mass = massOf(actor);
   }
   return e;
 }
@@ -75,6 +80,7 @@ std::vector<World::Drawing> World::drawings() const {
     if (actor.removed || !actor.edited) continue;
     Drawing drawing;
     drawing.object = actor.object.name;
+    drawing.mass = massAsSimulated(actor);
     if (actor.soft) drawGrid(actor.soft->body(), drawing);
     for (const Pull& pull : actor.pulls) {
       if (pull.to_target) continue;

@@ -75,8 +75,9 @@ class World {
   // For drawing: the volume grid's edges and fixed nodes of a deformable object, user forces.
   struct Drawing {
     std::string object;
-    std::vector<Eigen::Vector3d> edges;                               // pairs of points, world
-    std::vector<Eigen::Vector3d> fixed;                               // points, world
+    double mass = 0.0;                   // kg, as simulated; 0: it is not
+    std::vector<Eigen::Vector3d> edges;  // pairs of points, world
+    std::vector<Eigen::Vector3d> fixed;  // points, world
     std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> forces;  // point, N
   };
   std::vector<Drawing> drawings() const;
