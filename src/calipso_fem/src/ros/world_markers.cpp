@@ -125,7 +125,7 @@ void addGrid(const World::Drawing& drawing, double size, int id, const ros::Time
   grid.color = colour(0.2, 0.6, 1.0, 0.5);
   for (const auto& p : drawing.edges) grid.points.push_back(toPointMsg(p));
   Marker fixed = markerOf("fixed_nodes", id, Marker::SPHERE_LIST, stamp);
-  fixed.scale.x = fixed.scale.y = fixed.scale.z = 0.02 * size;
+  fixed.scale.x = fixed.scale.y = fixed.scale.z = 0.01 * size;
   fixed.color = colour(1.0, 0.8, 0.0);
   for (const auto& p : drawing.fixed) fixed.points.push_back(toPointMsg(p));
   for (Marker* m : {&grid, &fixed})

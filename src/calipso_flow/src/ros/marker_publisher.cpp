@@ -55,14 +55,23 @@ visualization_msgs::Marker trajectoryMarker(const ObjectDynamics& object,
   return marker;
 }
 
+// From one point by a way; one that is too short to be seen is taken away. The head's length goes
+// with the way: one of its own would turn a short arrow round.
+visualization_msgs::Marker arrowMarker(const std_msgs::Header& header, const std::string& ns,
+                                       const Eigen::Vector3d& from, const Eigen::Vector3d& way,
+                                       double size) {
+  auto arrow = makeMarker(header, ns, visualization_msgs::Marker::ARROW, size);
+  arrow.scale.y = 2.0 * size, arrow.scale.z = 0.0;
+  arrow.points = {toPointMsg(from), toPointMsg(from + way)};
+  if (!(way.norm() > 0.5 * size)) arrow.action = visualization_msgs::Marker::DELETE;
+  return arrow;
+}
+
 // The way the centroid goes in a tenth of a second.
 visualization_msgs::Marker velocityMarker(const ObjectMotion& motion, const std::string& name,
                                           const std_msgs::Header& header, double size) {
-  auto marker = makeMarker(header, name + "/velocity", visualization_msgs::Marker::ARROW, size);
-  marker.scale.y = 2.0 * size, marker.scale.z = 2.0 * size;
-  const Eigen::Vector3d from = motion.state.position;
-  marker.points = {toPointMsg(from), toPointMsg(from + 0.1 * motion.state.velocity)};
-  return marker;
+  return arrowMarker(header, name + "/velocity", motion.state.position, 0.1 * motion.state.velocity,
+                     size);
 }
 
 visualization_msgs::Marker collisionMarker(const ObjectDynamics& object,
@@ -97,10 +106,8 @@ std::vector<visualization_msgs::Marker> windMarkers(const ObjectDynamics& object
   const double time = object.deformation->times.at(index);
   const Eigen::Vector3d from = object.motions[index].state.position,
                         tip = from + 0.1 * wind.at(time);
-  auto arrow = makeMarker(header, object.name + "/wind", visualization_msgs::Marker::ARROW, size);
-  arrow.scale.y = 3.0 * size, arrow.scale.z = 3.0 * size;
+  auto arrow = arrowMarker(header, object.name + "/wind", from, tip - from, size);
   arrow.color.r = 0.3f, arrow.color.b = 1.0f;
-  arrow.points = {toPointMsg(from), toPointMsg(tip)};
   auto ball = makeMarker(header, object.name + "/wind uncertainty",
                          visualization_msgs::Marker::SPHERE, 1.0);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(0.01 * wind.covarianceAt(time));
@@ -139,7 +146,7 @@ visualization_msgs::MarkerArray markersOf(const ObjectDynamics& object, size_t i
   const ObjectMotion& motion = object.motions.at(index);
   visualization_msgs::MarkerArray markers;
   markers.markers = {
-      trackMarker(object, index, header, size), trajectoryMarker(object, header, size),
+      trackMarker(object, index, header, 0.5 * size), trajectoryMarker(object, header, size),
       velocityMarker(motion, object.name, header, size), collisionMarker(object, header, size),
       uncertaintyMarker(motion, object.name, header)};
   for (const auto& marker : windMarkers(object, index, header, size))
