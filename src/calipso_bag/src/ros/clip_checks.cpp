@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <iomanip>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 #include <stdexcept>
 
 #include "calipso_ros/conversions.hpp"
@@ -47,6 +49,26 @@ void checkStrokes(const std::string& path, const std::set<int>& indices) {
     fail(path, "value " + std::to_string(value) + " is the index of no object in scene.yaml (" +
                    known + "); list the object there, or erase its strokes (0)");
   }
+}
+
+void checkModelSize(const SceneObject& object, const TriangleMesh& model, const Camera& camera) {
+  const double rect_px = object.rect.tail<2>().cast<double>().norm();
+  if (rect_px <= 0.0 || model.vertexCount() == 0) return;
+  // A model may be made anywhere in its frame: the farther of its middle and its origin counts.
+  constexpr double kMostTimes = 20.0;  // a hidden or cut object's rectangle is smaller, too
+  const Eigen::Isometry3d camera_from_object =
+      camera.world_from_camera.inverse() * object.initial_world_from_object;
+  const Eigen::Vector3d middle = model.vertices.colwise().mean().transpose();
+  const double distance =
+      std::max((camera_from_object * middle).norm(), camera_from_object.translation().norm());
+  const double size = boundingDiagonal(model), size_px = camera.fx * size / distance;
+  if (size_px < kMostTimes * rect_px && size_px * kMostTimes > rect_px) return;
+  std::ostringstream what;
+  what << std::setprecision(3) << "the model is " << size << " m large and " << distance
+       << " m from the camera, which makes " << size_px << " px, but rect_xywh is " << rect_px
+       << " px across; scale the model to metres (0.001 from millimetres), or correct "
+       << "initial_world_T_object or rect_xywh of '" << object.name << "'";
+  fail(object.cad_path, what.str());
 }
 
 void checkImage(const sensor_msgs::Image& image, const std::string& where) {

@@ -6,6 +6,8 @@
 #include <set>
 #include <string>
 
+#include "calipso_scene/scene.hpp"
+
 namespace calipso::bag {
 
 // Each throws std::runtime_error naming what is wrong, the value and the remedy.
@@ -18,6 +20,9 @@ void checkPicture(const std::string& path, int bits, int width, int height);
 // Strokes mark nothing but background and these objects.
 // path: of a readable picture (checkPicture), "" for none; indices: of the scene's objects
 void checkStrokes(const std::string& path, const std::set<int>& indices);
+
+// At its rough place the model is about as large as the object's rectangle: models are in metres.
+void checkModelSize(const SceneObject& object, const TriangleMesh& model, const Camera& camera);
 
 // Encoding known, 8 bit, data complete.
 void checkImage(const sensor_msgs::Image& image, const std::string& where);

@@ -102,7 +102,7 @@ void Player::checkScene() const {
   for (const std::string& support : scene_.support_meshes) loadMesh(support);
   std::set<int> indices;
   for (const SceneObject& object : scene_.objects) {
-    loadMesh(object.cad_path);
+    checkModelSize(object, loadMesh(object.cad_path), scene_.camera);
     indices.insert(object.index);
   }
   checkStrokes(scene_.strokes_path, indices);
