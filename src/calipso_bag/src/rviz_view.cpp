@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kBesideRad = 0.35, kAboveRad = 0.25;  // from the camera's view
 constexpr double kLowestRad = 0.1, kHighestRad = 1.4;  // pitch: neither from below nor turned over
-constexpr double kDistance = 2.7;  // of the objects' radius; rviz sees 45 degrees
+constexpr double kDistance = 3.1;  // of the objects' radius; rviz sees 45 degrees
 constexpr double kNearest = 0.01;  // of the distance
 constexpr double kAxes = 0.3;      // of the objects' radius
 
