@@ -27,7 +27,7 @@ inline std::shared_ptr<Prepared> litSetting(const Setting& setting) {
 }
 
 struct BallStages {
-  RenderParams render = params();
+  RenderParams render;
   Setting setting{render};
   std::shared_ptr<Prepared> prepared = litSetting(setting);
   FrameInput input;
@@ -42,8 +42,9 @@ struct BallStages {
   cv::Mat removed;
   DrawnSurfaces surfaces;
 
-  explicit BallStages(const Eigen::Vector3f& move)
-      : input(setting.input(true, move)),
+  explicit BallStages(const Eigen::Vector3f& move, const RenderParams& render = params())
+      : render(render),
+        input(setting.input(true, move)),
         frame(*prepared, render, input),
         place(frame),
         reflections(frame, place),

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/imgproc.hpp>
+
 #include "ball_stages.hpp"
 #include "frame/occlusion.hpp"
 
@@ -98,6 +100,36 @@ TEST(PlaceLight, TheShadowGoesAlong) {
   }
   EXPECT_GT(dark, 100);
   EXPECT_GT(lit, 100);
+}
+
+// The shadow's core around `centre`, CV_8UC1.
+cv::Mat coreAround(const Eigen::Vector3d& centre) {
+  cv::Mat core = cv::Mat::zeros(kHeight, kWidth, CV_8U);
+  for (int v = 0; v < kHeight; ++v)
+    for (int u = 0; u < kWidth; ++u)
+      if (passesBy(u, v, centre).value_or(9.0) < kCore) core.at<std::uint8_t>(v, u) = 255;
+  return core;
+}
+
+// Where a shadow moves a little its middle stays the video's, which tells how dark it is; its edges
+// come from the plate.
+TEST(PlaceLight, DeepShadeThatStaysIsTheVideos) {
+  const Eigen::Vector3f move(-0.04f, 0.0f, 0.0f);
+  RenderParams narrow = params();  // the shadow is small
+  narrow.background.shadow_margin_px = 2;
+  const BallStages s(move, narrow);
+  const PlaceLight light(s.frame, s.place, s.resting, s.moved, s.region, s.surfaces.covered());
+  const int reach = narrow.background.shadow_margin_px + 2;
+  const cv::Mat before = coreAround(kCentre), now = coreAround(kCentre + move.cast<double>());
+  cv::Mat deep, edge;
+  cv::erode(before, deep, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));
+  cv::erode(before, edge, cv::Mat::ones(3, 3, CV_8U));
+  edge = before & ~edge & now, deep &= now;
+  cv::Mat relit = cv::Mat::zeros(before.size(), CV_8U);
+  light.relit().copyTo(relit(s.region.all));
+  ASSERT_GT(cv::countNonZero(deep), 20);
+  EXPECT_EQ(cv::countNonZero(relit & deep), 0);
+  EXPECT_GT(cv::countNonZero(relit & edge), cv::countNonZero(edge) / 4);
 }
 
 }  // namespace

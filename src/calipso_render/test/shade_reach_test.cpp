@@ -132,6 +132,29 @@ TEST(Renderer, TakesOutThePassingShadowOfAnObjectAndNoOther) {
   EXPECT_EQ(cv::countNonZero(out.provenance(p.cloud)), 0) << "the cloud's is the video's";
 }
 
+// A ball that is painted, and follows the video, has the video's own shadow; one that does not has a
+// new one.
+TEST(Renderer, TheShadowOfWhatFollowsTheVideoIsTheVideos) {
+  const Passing p;
+  const ClipFrame& last = p.frames.back();
+  FrameInput in;
+  in.bgr = last.bgr, in.labels = last.labels, in.camera = last.camera;
+  ObjectInFrame ball;
+  ball.name = "ball", ball.edited = true, ball.observed = Passing::poseAt(Passing::kFrames - 1);
+  ball.world_from_object = *ball.observed;
+  ball.vertices = transformed(p.prepared->surfaces[0].object_vertices, *ball.observed);
+  ball.look.albedo = cv::Vec3f(0.1f, 0.1f, 0.6f);
+  in.objects = {ball};
+  Renderer renderer(p.prepared, params());
+  cv::Mat around, shadow = p.shadow.clone();
+  cv::dilate(last.labels, around, cv::Mat::ones(21, 21, CV_8U));
+  shadow.setTo(0, around);
+  ASSERT_GT(cv::countNonZero(shadow), 100);
+  EXPECT_EQ(cv::norm(renderer.composite(in).bgr, last.bgr, cv::NORM_INF, shadow), 0.0);
+  for (Eigen::Vector3f& x : in.objects[0].vertices) x.y() += 0.05f;
+  EXPECT_GT(cv::norm(renderer.composite(in).bgr, last.bgr, cv::NORM_INF, shadow), 20.0);
+}
+
 // A quarter of the ball that its mask misses; a hand beside it stays.
 TEST(Renderer, TakesOutWhatAMaskMissesOfAnObjectThatIsFollowed) {
   const Passing p;

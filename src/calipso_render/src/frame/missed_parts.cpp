@@ -47,8 +47,8 @@ void addAbout(const cv::Mat& mask, cv::Mat& to) {
   to(box) |= about;
 }
 
-// Where edited objects that move are seen in this frame: by their models, or about their masks where
-// no pose is known.
+// Where edited objects that move, and no longer follow the video, are seen in this frame: by their
+// models, or about their masks where no pose is known.
 struct Outlines {
   cv::Mat all, gone;  // CV_8UC1, whole picture; of those that are gone from there
 };
@@ -57,7 +57,7 @@ Outlines outlines(const StagedFrame& frame) {
   cv::Mat within = cv::Mat::zeros(frame.labels.size(), CV_8U), gone = within.clone();
   for (std::size_t i = 0; i < frame.edited.size(); ++i) {
     const Surface& surface = frame.prepared.surfaces[i];
-    if (!frame.edited[i] || !frame.prepared.moves[i] || !surface.in_video) continue;
+    if (!frame.casts(i) || !frame.prepared.moves[i] || !surface.in_video) continue;
     const auto& vertices = frame.observed[i];
     if (!vertices) {
       addAbout(frame.labels == surface.index, within);

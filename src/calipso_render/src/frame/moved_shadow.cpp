@@ -26,15 +26,16 @@ std::unique_ptr<Visibility> skyOfObserved(const StagedFrame& frame) {
 }  // namespace
 
 MovedShadow::MovedShadow(const StagedFrame& frame, const SeenPlace& place) {
-  std::vector<Occluder> moved;
+  std::vector<Occluder> edited, moved;
   for (const StagedObject& object : frame.objects) {
-    if (object.edited) moved.push_back(object.occluder());
+    if (object.edited) edited.push_back(object.occluder());
+    if (frame.casts(object.surface)) moved.push_back(object.occluder());
   }
   sideBySide(
       frame.params.quality == Quality::kLive,
       [&] { sun = sunVisibility(moved, frame.light, frame.params); },
       [&] {
-        sky = skyVisibility(moved, frame.params);
+        sky = skyVisibility(edited, frame.params);
         sky_before = skyOfObserved(frame);
         on_walls = skyOnWalls(moved, place.view.relief(), frame.params);
         for (const Occluder& o : moved)

@@ -10,7 +10,8 @@
 
 namespace calipso::render {
 
-// What the edited objects leave of sun and sky where they are now.
+// What the edited objects leave of sun and sky where they are now. The sun's shade of those that
+// follow the video is the video's.
 struct MovedShadow {
   // The frame must outlive this.
   MovedShadow(const StagedFrame& frame, const SeenPlace& place);

@@ -15,8 +15,8 @@ struct PlateInView {
   cv::Mat quiet;   // ... nor, as far as a depth image tells, the sky
 };
 
-// The shadows of edited objects that move in the video show as darkening against the plate. With
-// them goes what masks miss of these objects (missedParts()).
+// The shadows of edited objects that move in the video, and no longer follow it, show as darkening
+// against the plate. With them goes what masks miss of these objects (missedParts()).
 // @param unmirrored CV_8UC3, the frame without what planes mirror of objects at rest
 // @param others_sun RestingLight::othersSunInVideo(): what others shade is not taken for theirs
 // @param at_key of the key frame's view; made if it is empty

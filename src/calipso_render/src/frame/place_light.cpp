@@ -18,6 +18,7 @@ namespace {
 
 // levels of the sky, a fifth: so much more or less of it only brightens or darkens a pixel
 constexpr float kSoftSky = 51.0f;
+constexpr int kFullShade = 15;  // level of the sun
 // of the sky's light: differences of levels that come of no more are less than kSameLevels, or no
 // more than kSoftSky, also once they are rounded
 constexpr float kSameSky = (kSameLevels - 2.1f) * kPerLevel,
@@ -52,6 +53,15 @@ CALIPSO_WIDE_LOOPS void findChanges(const LightChange& at, float umbra, int coun
   for (int k = 0; k < 5; ++k) std::copy_n(from[k] + done, more, rest[k]);
   const EightBytes changes = eightChanges({rest[0], rest[1], rest[2], rest[3], rest[4]}, umbra, 0);
   std::memcpy(out + done, &changes, more);
+}
+
+// @param sun level now @param near_light != 0: not deep in a shadow before
+CALIPSO_WIDE_LOOPS void keepShade(const std::uint8_t* sun, const std::uint8_t* near_light,
+                                  int count, std::uint8_t* relit) {
+  for (int u = 0; u < count; ++u) {
+    const int most = near_light[u] != 0 ? 255 : std::min(255, sun[u] * (255 / kFullShade));
+    relit[u] = static_cast<std::uint8_t>(std::min<int>(relit[u], most));
+  }
 }
 
 }  // namespace
@@ -197,9 +207,22 @@ void PlaceLight::findRelit() {
   cv::Mat wide(box.size(), CV_8U);
   filterTiles(openedByThree(change), reach, wide, DiscDilation(reach));
   cv::min(wide, resting_.shaded()(box), wide);
+  leaveDeepShade(box, reach, wide);
   filterTiles(wide, 1, relit_(box - region_.tl()), [](const cv::Mat& from, cv::Mat& to) {
     cv::blur(from, to, {3, 3});
   });
+}
+
+// What was deep in a shadow and still is keeps its own pixels: they tell how dark it is there.
+// @param box of the picture @param relit over it
+void PlaceLight::leaveDeepShade(const cv::Rect& box, int reach, cv::Mat& relit) const {
+  const cv::Rect here = box - region_.tl();
+  const cv::Mat in_light = sun_before_(here) > kFullShade;
+  cv::Mat near_light(box.size(), CV_8U);
+  filterTiles(in_light, reach, near_light, DiscDilation(reach));
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < box.height; ++v)
+    keepShade(sun_.ptr(here.y + v) + here.x, near_light.ptr(v), box.width, relit.ptr(v));
 }
 
 // changeOfLight() at columns [from, to) of row v, where it is more than a pixel can follow.

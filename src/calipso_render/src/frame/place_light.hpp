@@ -43,6 +43,7 @@ class PlaceLight {
   void findWallChanges(SquareMask& changes);
   void measureRun(const SkyGrid& sky_grid, int v, int begin, int end);
   void findRelit();
+  void leaveDeepShade(const cv::Rect& box, int reach, cv::Mat& relit) const;
   void findChange(int v, int from, int to, std::uint8_t* out) const;
 
   const StagedFrame& frame_;

@@ -55,17 +55,18 @@ float darkeningAt(const PlaceView& view, const cv::Vec3f& umbra, int u, int v, s
 }  // namespace
 
 const RestingLight& RestingLight::update(const StagedFrame& frame, const SeenPlace& place) {
-  std::vector<Occluder> others;
+  std::vector<Occluder> others, unedited;
   std::vector<Points> others_now;
   for (const StagedObject& object : frame.objects) {
-    if (object.edited) continue;
+    if (frame.casts(object.surface)) continue;
     others.push_back(object.occluder());
+    if (!object.edited) unedited.push_back(object.occluder());
     others_now.push_back(object.actor.vertices);
   }
   const bool same = others_ && edited_ == frame.edited && sun_ == frame.light.direction &&
                     sameView(camera_, frame.input.camera);
   const bool others_rest = others_vertices_ == others_now;
-  if (!same || !others_rest) measureOthers(frame, place, others);
+  if (!same || !others_rest) measureOthers(frame, place, others, unedited);
   if (!same) measureOriginals(frame, place);
   if (!same || !others_rest) findShaded(frame, place), join(frame, place);
   edited_ = frame.edited, camera_ = frame.input.camera, sun_ = frame.light.direction;
@@ -74,7 +75,8 @@ const RestingLight& RestingLight::update(const StagedFrame& frame, const SeenPla
 }
 
 void RestingLight::measureOthers(const StagedFrame& frame, const SeenPlace& place,
-                                 const std::vector<Occluder>& others) {
+                                 const std::vector<Occluder>& others,
+                                 const std::vector<Occluder>& unedited) {
   others_ = sunVisibility(others, frame.light, frame.params);
   const auto levels = [&](const Visibility& sun, const Light& light) {
     cv::Rect bounds;
@@ -89,11 +91,11 @@ void RestingLight::measureOthers(const StagedFrame& frame, const SeenPlace& plac
       as_in_video ? others_sun_ : levels(*sunVisibility(others, of_video, frame.params), of_video);
   sunless_place_ = as_in_video ? place.sunless : cv::Mat();
   others_sky_.release();
-  if (others.empty()) return;
-  const auto sky = skyVisibility(others, frame.params);
+  if (unedited.empty()) return;
+  const auto sky = skyVisibility(unedited, frame.params);
   others_sky_ =
       skyLevels(skyGrid(frame, place, *sky), place, *sky,
-                skyOnWalls(others, place.view.relief(), frame.params), frame.input.bgr.size());
+                skyOnWalls(unedited, place.view.relief(), frame.params), frame.input.bgr.size());
 }
 
 void RestingLight::measureOriginals(const StagedFrame& frame, const SeenPlace& place) {

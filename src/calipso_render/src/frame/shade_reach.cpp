@@ -61,7 +61,7 @@ cv::Mat reachOfPassing(const StagedFrame& frame, const PlaceView& place) {
   const Prepared& prepared = frame.prepared;
   std::vector<Ball> balls;
   for (std::size_t i = 0; i < frame.edited.size(); ++i) {
-    if (!frame.edited[i] || !prepared.moves[i] || !prepared.surfaces[i].in_video) continue;
+    if (!frame.casts(i) || !prepared.moves[i] || !prepared.surfaces[i].in_video) continue;
     const auto& vertices = frame.observed[i];
     if (!vertices) return {};
     balls.push_back(ballAround(*vertices));

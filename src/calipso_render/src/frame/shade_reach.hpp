@@ -33,8 +33,8 @@ Ball ballAround(const Points& vertices);
 cv::Mat shadeReach(const std::vector<Ball>& balls, const std::vector<SunRange>& sun,
                    const PlaceView& place, const cv::Size& size);
 
-// The same of all edited objects that move in the video, where it has them in this frame; empty:
-// anywhere, since that is not known of one of them.
+// The same of all edited objects that move in the video and no longer follow it, where it has them
+// in this frame; empty: anywhere, since that is not known of one of them.
 cv::Mat reachOfPassing(const StagedFrame& frame, const PlaceView& place);
 
 }  // namespace calipso::render

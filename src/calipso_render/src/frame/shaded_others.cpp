@@ -30,7 +30,8 @@ struct LightBox {
 std::vector<LightBox> shadingBoxes(const StagedFrame& frame) {
   std::vector<LightBox> boxes;
   for (const StagedObject& object : frame.objects) {
-    if (object.edited) boxes.emplace_back(object.actor.vertices, frame.light.direction);
+    if (frame.casts(object.surface))
+      boxes.emplace_back(object.actor.vertices, frame.light.direction);
   }
   for (std::size_t i = 0; i < frame.moved.size(); ++i) {
     const Surface& s = frame.prepared.surfaces[i];

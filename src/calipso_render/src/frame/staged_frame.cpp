@@ -136,6 +136,20 @@ std::optional<Points> observedPlace(const StagedFrame& frame, int surface) {
   return frame.isSeenAt(surface, vertices) ? std::optional<Points>(vertices) : std::nullopt;
 }
 
+// Whether an edited object is where the video has it as it moves.
+bool isAsObserved(const StagedFrame& frame, const StagedObject& object) {
+  const auto& observed = frame.observed[object.surface];
+  const Points& now = object.actor.vertices;
+  if (!frame.params.keep_still || !object.edited || !observed || observed->size() != now.size())
+    return false;
+  const auto focal = static_cast<float>(frame.input.camera.fx);
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    const float px_per_m = focal * object.actor.screen.points[i].z();
+    if (!((now[i] - (*observed)[i]).norm() * px_per_m < kMovedPx)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 StagedFrame::StagedFrame(const Prepared& prepared, const RenderParams& params,
@@ -155,6 +169,9 @@ StagedFrame::StagedFrame(const Prepared& prepared, const RenderParams& params,
   for (int i = 0; i < count; ++i) stageObject(i, states[i], *this);
   moved = movedSurfaces(*this);
   for (int i = 0; i < count; ++i) observed.push_back(observedPlace(*this, i));
+  follows.assign(count, false);
+  for (const StagedObject& object : objects)
+    follows[object.surface] = isAsObserved(*this, object);
 }
 
 bool StagedFrame::isSeenAt(int surface, const Points& vertices) const {

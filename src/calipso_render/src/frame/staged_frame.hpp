@@ -55,6 +55,9 @@ struct StagedFrame {
   // per surface: where the video has one that is edited and moves in it, if its state says so and
   // it is seen there; world, m
   std::vector<std::optional<Points>> observed;
+  // per surface: edited, but where the video has it as it moves, as its looks alone are edited: its
+  // shade is the video's
+  std::vector<bool> follows;
 
   cv::Rect whole() const { return {{0, 0}, input.bgr.size()}; }
   const StagedObject& objectOf(std::uint32_t id) const {
@@ -68,6 +71,8 @@ struct StagedFrame {
   bool isSeenAt(int surface, const Points& vertices) const;
   // Whether any edited object moves in the video.
   bool movesInVideo() const;
+  // Whether an object is edited, and its shade, and what its mask misses, no longer the video's.
+  bool casts(std::size_t surface) const { return edited[surface] && !follows[surface]; }
 
   // How far from its place in the video a surface point is seen, px. @pre the video has its object
   // at rest
