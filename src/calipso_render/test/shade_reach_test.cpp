@@ -132,8 +132,8 @@ TEST(Renderer, TakesOutThePassingShadowOfAnObjectAndNoOther) {
   EXPECT_EQ(cv::countNonZero(out.provenance(p.cloud)), 0) << "the cloud's is the video's";
 }
 
-// A ball that is painted, and follows the video, has the video's own shadow; one that does not has a
-// new one.
+// A ball that is painted, and follows the video, has the video's own shadow; one that does not has
+// a new one.
 TEST(Renderer, TheShadowOfWhatFollowsTheVideoIsTheVideos) {
   const Passing p;
   const ClipFrame& last = p.frames.back();

@@ -215,8 +215,7 @@ class Evaluation {
   void judgeUndeformed() {
     const auto everything = [](std::size_t, ObjectInFrame& o) { o.edited = true; };
     const FrameInput in = frame(0, everything);
-    const cv::Mat mask = in.labels != 0, inside = shrink(mask, kRim),
-                  seam = rim(mask, kSeam);
+    const cv::Mat mask = in.labels != 0, inside = shrink(mask, kRim), seam = rim(mask, kSeam);
     const cv::Mat kept = Renderer(prepared_, params_).composite(in).bgr;
     const cv::Mat drawn = Renderer(prepared_, without(false, false)).composite(in).bgr;
     picture("undeformed", drawn);

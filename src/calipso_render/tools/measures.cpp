@@ -84,9 +84,7 @@ cv::Mat shrink(const cv::Mat& mask, int radius) {
   return out;
 }
 
-cv::Mat rim(const cv::Mat& mask, int radius) {
-  return grow(mask, radius) & ~shrink(mask, radius);
-}
+cv::Mat rim(const cv::Mat& mask, int radius) { return grow(mask, radius) & ~shrink(mask, radius); }
 
 void keepLowest(std::optional<double>& lowest, std::optional<double> value) {
   if (value && (!lowest || *value < *lowest)) lowest = value;

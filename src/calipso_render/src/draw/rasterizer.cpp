@@ -52,8 +52,14 @@ struct Part {
 void split(const ScreenMesh& mesh, std::size_t object, std::vector<Part>& parts) {
   const int count = static_cast<int>(mesh.triangles->size());
   for (int begin = 0; begin < count; begin += kPartTriangles) {
-    parts.push_back({&mesh, begin, std::min(begin + kPartTriangles, count),
-                     static_cast<std::uint32_t>(object) << 24, nullptr, 0, {}, {}});
+    parts.push_back({&mesh,
+                     begin,
+                     std::min(begin + kPartTriangles, count),
+                     static_cast<std::uint32_t>(object) << 24,
+                     nullptr,
+                     0,
+                     {},
+                     {}});
   }
 }
 

@@ -168,8 +168,7 @@ class Seams {
       turns.push_back(std::move(turn));
     }
     std::stable_sort(turns.begin(), turns.end(), [&](const Turn& a, const Turn& b) {
-      return a.wave != b.wave ? a.wave < b.wave
-                              : pixels_[a.label].size() > pixels_[b.label].size();
+      return a.wave != b.wave ? a.wave < b.wave : pixels_[a.label].size() > pixels_[b.label].size();
     });
     return turns;
   }

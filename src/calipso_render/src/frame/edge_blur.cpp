@@ -23,7 +23,7 @@ constexpr float kUsual = 0.3f;  // px: what lenses and pixels that overlap do; f
 // quantiles of the places' widths, and how much softer the one may be than the other
 constexpr double kQuantile = 0.25, kSharp = 0.1;
 constexpr float kSofter = 1.5f;
-constexpr float kBeside = 2.5f;  // px from an outline: colours are those of what lies there
+constexpr float kBeside = 2.5f;      // px from an outline: colours are those of what lies there
 constexpr float kPixel = 0.288675f;  // standard deviation of a pixel's own width, px
 constexpr float kFinest = 1.15f;     // factor between the widths that are tried
 constexpr float kWidest = 3.0f;      // px

@@ -14,8 +14,8 @@ namespace calipso::render {
 
 // Light on the place before an edit, which stays the same while the same objects are edited under
 // the same camera: what is not edited, or follows the video, shades (the others), and what the
-// edited objects shade where the video has them (the originals). Pictures are CV_8UC1 of the whole frame: lightLevel() of sun or sky on
-// support plane or relief there.
+// edited objects shade where the video has them (the originals). Pictures are CV_8UC1 of the whole
+// frame: lightLevel() of sun or sky on support plane or relief there.
 class RestingLight {
  public:
   // Brings it up to date: after it this light is that of the frame.
@@ -54,8 +54,7 @@ class RestingLight {
 
  private:
   void measureOthers(const StagedFrame& frame, const SeenPlace& place,
-                     const std::vector<Occluder>& others,
-                     const std::vector<Occluder>& unedited);
+                     const std::vector<Occluder>& others, const std::vector<Occluder>& unedited);
   void measureOriginals(const StagedFrame& frame, const SeenPlace& place);
   void findShaded(const StagedFrame& frame, const SeenPlace& place);
   void join(const StagedFrame& frame, const SeenPlace& place);

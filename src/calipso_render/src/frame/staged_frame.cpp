@@ -170,8 +170,7 @@ StagedFrame::StagedFrame(const Prepared& prepared, const RenderParams& params,
   moved = movedSurfaces(*this);
   for (int i = 0; i < count; ++i) observed.push_back(observedPlace(*this, i));
   follows.assign(count, false);
-  for (const StagedObject& object : objects)
-    follows[object.surface] = isAsObserved(*this, object);
+  for (const StagedObject& object : objects) follows[object.surface] = isAsObserved(*this, object);
 }
 
 bool StagedFrame::isSeenAt(int surface, const Points& vertices) const {
