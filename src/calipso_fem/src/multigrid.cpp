@@ -40,7 +40,8 @@ Vec freeComponents(const BlockMatrix& A) {
   return free;
 }
 
-// A coarse component that no free fine one feeds gets a unit row.
+// A coarse component that no free fine one feeds has an empty row and, as its inverse diagonal is
+// zero, never moves. The coarsest inverse needs a unit row there.
 void fillEmptyRows(BlockMatrix* A) {
   for (int k : A->pattern->diagonal)
     for (int c = 0; c < 3; ++c)
@@ -136,7 +137,6 @@ bool Multigrid::update(HexLevel* fine, const AlignedBuffer<double>& diagonal) {
   Level& finest = levels_.front();
   finest.fine = fine;
   if (!invertDiagonal(diagonal.data(), &finest)) return false;
-  if (hasCoarse()) fillEmptyRows(&levels_[1].own);
   if (!updateCoarse()) return false;
   if (hasCoarse()) estimate(&finest);
   return true;
@@ -154,7 +154,6 @@ bool Multigrid::update(const BlockMatrix& A) {
   if (levels_[1].own.pattern == nullptr)
     setCoarsePattern(coarsePattern(*A.pattern, finest.to_coarse));
   galerkin(A, finest.to_coarse, free, &levels_[1].own);
-  fillEmptyRows(&levels_[1].own);
   if (!updateCoarse()) return false;
   estimate(&finest);
   return true;
@@ -163,13 +162,11 @@ bool Multigrid::update(const BlockMatrix& A) {
 bool Multigrid::updateCoarse() {
   for (std::size_t l = 1; l < levels_.size(); ++l) {
     Level& level = levels_[l];
-    const Vec free = freeComponents(level.own);
-    if (!invertDiagonal(diagonalBlocks(level.own, Vec::Ones(free.size())).data(), &level))
-      return false;
+    const Vec all = Vec::Ones(3 * level.nodes);
+    if (!invertDiagonal(diagonalBlocks(level.own, all).data(), &level)) return false;
     if (l + 1 == levels_.size()) break;
     level.A.assign(level.own);
-    galerkin(level.own, level.to_coarse, free, &levels_[l + 1].own);
-    fillEmptyRows(&levels_[l + 1].own);
+    galerkin(level.own, level.to_coarse, all, &levels_[l + 1].own);
     estimate(&level);
   }
   return hasCoarse() ? factorizeCoarsest() : true;
@@ -188,6 +185,7 @@ bool Multigrid::widen() {
 }
 
 bool Multigrid::factorizeCoarsest() {
+  fillEmptyRows(&levels_.back().own);
   Eigen::MatrixXd A(levels_.back().own.toSparse());
   Eigen::LLT<Eigen::MatrixXd> llt(A);
   if (llt.info() != Eigen::Success) {
