@@ -232,7 +232,7 @@ void DeformableBody::Impl::assemble(const Vec& y, const Integrator& i, Definiten
   addSoftHessian(i, &A);
 }
 
-// The viscous part is taken at y instead of viscosity_at: exact in the first iteration of a step.
+// The preconditioner alone has the viscous part at y instead of viscosity_at.
 bool DeformableBody::Impl::setMatrixFreeSystem(const Vec& y, const Integrator& i,
                                                Definiteness definiteness) {
   const bool positive = definiteness == Definiteness::kPositive;
@@ -241,7 +241,8 @@ bool DeformableBody::Impl::setMatrixFreeSystem(const Vec& y, const Integrator& i
   HexSystem system;
   system.positive = positive;
   system.inertia = i.inertia + i.rate * options.mass_damping;
-  system.factor = 1.0 + i.rate * damping();
+  system.viscosity = i.rate * damping();
+  if (system.viscosity > 0.0 && viscosity_at != y) system.viscous_at = viscosity_at;
   for (const SoftTerm& term : soft) {
     SpringBlock spring;
     for (Eigen::SparseVector<double>::InnerIterator it(term.weights); it; ++it)

@@ -24,7 +24,7 @@ void HexLevel::allocate(const StvkHexes& h) {
 void HexLevel::load(const AlignedBuffer<double>& at, const AlignedBuffer<double>& at_stress,
                     const HexSystem& system, const AlignedBuffer<double>& at_mass,
                     const std::vector<int>& fixed) {
-  factor = static_cast<float>(system.factor);
+  factor = static_cast<float>(1.0 + system.viscosity);
   std::fill(free.begin(), free.end(), 1.0f);
   for (std::size_t k = 3; k < free.size(); k += 4) free[k] = 0.0f;
   for (int dof : fixed) free[4L * hexes->nodeOf(dof / 3) + dof % 3] = 0.0f;

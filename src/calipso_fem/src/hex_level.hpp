@@ -15,12 +15,13 @@ struct SpringBlock {
   Eigen::Matrix3d block;
 };
 
-// A = factor K_material(x) + K_geometric(x) + inertia M + springs, rows and columns of fixed
-// components out.
+// A = K_material(x) + viscosity K_material(viscous_at) + K_geometric(x) + inertia M + springs, rows
+// and columns of fixed components out. The float level takes all of it at x.
 struct HexSystem {
-  bool positive = false;  // known to be positive definite
-  double factor = 1.0;    // 1 + rate * stiffness damping
-  double inertia = 0.0;   // 1/s^2, times the lumped mass
+  bool positive = false;   // known to be positive definite
+  double viscosity = 0.0;  // rate * stiffness damping
+  Vec viscous_at;          // 3n, m, where the viscosity acts; empty: at the positions themselves
+  double inertia = 0.0;    // 1/s^2, times the lumped mass
   std::vector<SpringBlock> springs;
 };
 

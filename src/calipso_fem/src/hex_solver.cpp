@@ -24,7 +24,7 @@ double total(const std::vector<double>& parts) {
 
 // Work space of CG, four numbers per node; partial sums per kGrain nodes.
 struct HexSolver::Vectors {
-  AlignedBuffer<double> x, b, r, p, Ap, slots;
+  AlignedBuffer<double> x, b, r, p, Ap, slots, viscous_slots;
   std::vector<double> rr, rz, pAp;
   SpringForces<double> springs;
 
@@ -32,7 +32,7 @@ struct HexSolver::Vectors {
     const std::size_t nodes = h.nodeCount(), blocks = (nodes + kGrain - 1) / kGrain;
     for (auto* field : {&x, &b, &r, &p, &Ap}) field->assign(4 * nodes, 0.0);
     springs.allocate(nodes);
-    slots.resize(h.slotNumbers<double>());
+    for (auto* field : {&slots, &viscous_slots}) field->resize(h.slotNumbers<double>());
     for (auto* sums : {&rr, &rz, &pAp}) sums->assign(blocks, 0.0);
   }
 };
@@ -90,6 +90,9 @@ bool HexSolver::setSystem(HexEvaluation* at, HexSystem system, const Eigen::Vect
     for (auto& [node, weight] : s.weights) node = hexes_->nodeOf(node);
   for (int i = 0; i < hexes_->nodeCount(); ++i)
     mass_[i] = system_.inertia * lumped_mass[hexes_->meshNode(i)];
+  viscous_x_.resize(system_.viscous_at.size() > 0 ? x_.size() : 0);
+  if (!viscous_x_.empty())
+    hexes_->take(system_.viscous_at, 0, hexes_->nodeCount(), viscous_x_.data());
   fine_->load(x_, stress_, system_, mass_, fixed);
   vectors_->springs.set(system_.springs);
   current_ = false;
@@ -190,15 +193,23 @@ void HexSolver::addMassAndSprings() {
 // y = A x for nodes begin .. end of this thread; x is complete.
 void HexSolver::product(const Crew& crew, int begin, int end, const double* x, double* y) const {
   Vectors& v = *vectors_;
-  const bool springs = !v.springs.empty();
+  const bool springs = !v.springs.empty(), apart = !viscous_x_.empty();
   if (crew.rank() == 0 && springs) v.springs.apply(x);
   const auto multiply = [&](int first, int last) {
     hexKernel().multiply(hexes_->batches<double>(), first, last, x_.data(), stress_.data(),
-                         system_.factor, x, v.slots.data());
+                         apart ? 1.0 : 1.0 + system_.viscosity, x, v.slots.data());
+    if (apart)
+      hexKernel().multiply(hexes_->batches<double>(), first, last, viscous_x_.data(), nullptr,
+                           system_.viscosity, x, v.viscous_slots.data());
   };
   sweepRows<double>(crew, *hexes_, begin, end, !springs, multiply, [&](int node) {
     double* row = y + 4L * node;
     hexes_->sumSlots(v.slots.data(), node, row);
+    if (apart) {
+      alignas(32) double viscous[4];
+      hexes_->sumSlots(v.viscous_slots.data(), node, viscous);
+      for (int c = 0; c < 3; ++c) row[c] += viscous[c];
+    }
     for (int c = 0; c < 3; ++c) row[c] += mass_[node] * x[4L * node + c];
     if (!springs) return;
     for (int c = 0; c < 3; ++c) row[c] += v.springs.at(node)[c];

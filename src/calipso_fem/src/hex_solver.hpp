@@ -48,6 +48,7 @@ class HexSolver {
 
   const StvkHexes* hexes_;
   AlignedBuffer<double> x_, stress_;  // as in HexEvaluation
+  AlignedBuffer<double> viscous_x_;   // as x_, where the viscosity acts; empty: at x_
   AlignedBuffer<double> diagonal_;    // blocks, 9 per node
   AlignedBuffer<double> mass_;        // inertia times mass, kg/s^2
   HexSystem system_;                  // springs in the numbering of hexes_
