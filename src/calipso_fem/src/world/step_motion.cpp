@@ -24,6 +24,8 @@ void addForce(Vec& surface, const SurfacePoint& point, const Eigen::Vector3d& fo
 // lift what lies there.
 constexpr double kOverlapShare = 0.2, kPushOutRate = 4.0, kOverlapLeft = 0.04;
 
+constexpr double kUnmoved = 1e-7;  // of a body's size: no way
+
 }  // namespace
 
 double allowance(const Contact& c, double h) {
@@ -41,6 +43,7 @@ StepMotion::StepMotion(const std::vector<SoftEntry>& softs, const std::vector<Ob
     b.soft = entry.soft;
     b.soft->beginStep(h);
     b.start = b.soft->vertices();
+    b.size = (b.start.colwise().maxCoeff() - b.start.colwise().minCoeff()).norm();
     b.target = b.soft->body().trialPositions();
     b.forces.setZero(b.target.size());
     const Vec s = h * b.soft->body().surfaceVelocities();  // until there is a target
@@ -164,12 +167,14 @@ void StepMotion::advanceFree() {
     DeformableBody& fem = b.soft->body();
     const double t = fem.trialStepLength(b.target, b.forces);
     if (t != 1.0) b.target = (1.0 - t) * fem.trialPositions() + t * b.target;
+    const double way = (b.target - fem.trialPositions()).lpNorm<Eigen::Infinity>();
     fem.moveTrial(b.target);
     if (t != 1.0) measure(b);
     b.residual_before = b.residual;
     b.residual = fem.trialResidual(b.forces);
     // Where hardly any force acts, rounding is all that is left of the residual.
-    b.stuck = t == 0.0 || (b.residual_before > 0.0 && b.residual > 0.5 * b.residual_before);
+    const bool halved = b.residual_before == 0.0 || b.residual <= 0.5 * b.residual_before;
+    b.stuck = t == 0.0 || (!halved && way < kUnmoved * b.size);
   }
 }
 

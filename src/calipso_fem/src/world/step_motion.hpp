@@ -28,7 +28,8 @@ class StepMotion {
     double residual = 0.0, residual_before = 0.0;
     double residual_there = 0.0;  // at targets that are tried
     double share = 1.0;           // of the way to the target that its potential falls
-    bool stuck = false;           // the potential falls no more
+    bool stuck = false;           // the potential falls no more, or the residual is rounding
+    double size = 0.0;            // diagonal of its bounding box, m
   };
 
   StepMotion(const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
