@@ -52,7 +52,7 @@ Vec DeformableBody::trialDirection(const Vec& contact_forces) {
   Impl& m = *impl_;
   Impl::Trial& t = m.runningTrial();
   Vec direction;
-  const Vec residual = m.trialGradient() - contact_forces, jump = t.targets - t.y;
+  const Vec residual = m.trialGradient() - contact_forces, jump = trialJump();
   Vec masked = residual;
   m.maskResidual(&masked);
   const double tolerance =

@@ -180,6 +180,24 @@ TEST(Solver, MatrixFreeTangentKnowsWhereTheViscosityActs) {
   EXPECT_LE(iterations[0], 1.3 * iterations[1]);
 }
 
+// What the parts of a step are asked for is no more than the step itself does.
+TEST(Solver, AStepTakenInPartsSolvesTheSameDirections) {
+  DeformableBody whole = makeSheet(SolverKind::kMultigrid),
+                 parts = makeSheet(SolverKind::kMultigrid);
+  const Vec none = Vec::Zero(3 * parts.nodeCount());
+  int iterations[2] = {0, 0};
+  for (int k = 0; k < 10; ++k) {
+    const StepReport report = whole.step(kStep);
+    parts.beginStep(kStep);
+    parts.predictTrial();
+    for (int i = 0; i < report.newton_iterations; ++i)
+      parts.moveTrial(parts.trialPositions() + parts.trialDirection(none));
+    iterations[0] += report.linear_iterations;
+    iterations[1] += parts.endStep(none).linear_iterations;
+  }
+  EXPECT_LE(iterations[1], 1.1 * iterations[0]);
+}
+
 TEST(Solver, SameBytesForAnyNumberOfThreads) {
   for (const SolverKind solver : {SolverKind::kMultigrid, SolverKind::kJacobi}) {
     Vec first;
