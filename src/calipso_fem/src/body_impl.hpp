@@ -140,8 +140,8 @@ struct DeformableBody::Impl {
   // there.
   bool moveAhead(const Integrator& i, const Vec& loads, Vec* y);
   // Relative residual to which Newton's direction number `iteration` (from 0) is worth solving for.
-  // residual_before: norm at the last one; 0 at the first
-  double forcing(int iteration, double residual, double residual_before) const;
+  // residual_before: norm at the last one; 0 at the first. wanted: norm to end with
+  double forcing(int iteration, double residual, double residual_before, double wanted) const;
   // One Newton direction; false when no positive definite system could be solved.
   bool newtonDirection(const Vec& y, const Integrator& i, const Vec& residual, const Vec& jump,
                        double linear_tolerance, StepReport* report, Vec* direction);

@@ -18,6 +18,8 @@ double millisecondsSince(std::chrono::steady_clock::time_point start) {
 
 // Largest relative residual of a Newton direction.
 constexpr double kLoosestForcing = 0.05;
+// Of the residual with which a step may end: what the last direction is solved to.
+constexpr double kSpare = 0.1;
 
 }  // namespace
 
@@ -83,12 +85,14 @@ bool DeformableBody::Impl::newtonDirection(const Vec& y, const Integrator& i, co
 }
 
 // Forcing terms (Eisenstat and Walker 1996, choice 2): no direction is solved for better than it is
-// worth. Steps that take long get exact ones: near-incompressible bodies would run out of
-// iterations.
-double DeformableBody::Impl::forcing(int iteration, double residual, double residual_before) const {
-  if (iteration >= 2) return options.linear_tolerance;
+// worth. Steps that take long get ones that could end them: near-incompressible bodies would run
+// out of iterations.
+double DeformableBody::Impl::forcing(int iteration, double residual, double residual_before,
+                                     double wanted) const {
   const double ratio = residual_before > 0.0 ? residual / residual_before : 1.0;
-  return std::max(options.linear_tolerance, std::min(kLoosestForcing, 0.9 * ratio * ratio));
+  const double worth = iteration < 2 ? 0.9 * ratio * ratio : 0.0;
+  const double enough = std::max(options.linear_tolerance, kSpare * wanted / residual);
+  return std::min(kLoosestForcing, std::max(enough, worth));
 }
 
 double DeformableBody::Impl::searchLine(const Vec& y, const Vec& direction, const Vec& residual,
@@ -116,12 +120,14 @@ StepReport DeformableBody::Impl::minimise(const Integrator& i, const Vec& loads,
   for (; report.newton_iterations < most; ++report.newton_iterations) {
     Vec masked = r;
     maskResidual(&masked);
-    report.residual = masked.norm() / forceScale(*y, i, loads);
+    const double scale = forceScale(*y, i, loads);
+    report.residual = masked.norm() / scale;
     if (!linearised && jump.isZero(0.0) && report.residual <= options.newton_tolerance) break;
     const double linear_tolerance =
         linearised || !jump.isZero(0.0)
             ? options.linear_tolerance
-            : forcing(report.newton_iterations, masked.norm(), residual_before);
+            : forcing(report.newton_iterations, masked.norm(), residual_before,
+                      options.newton_tolerance * scale);
     residual_before = masked.norm();
     if (!newtonDirection(*y, i, r, jump, linear_tolerance, &report, &direction)) {
       report.message =

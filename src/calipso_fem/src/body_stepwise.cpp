@@ -55,9 +55,11 @@ Vec DeformableBody::trialDirection(const Vec& contact_forces) {
   const Vec residual = m.trialGradient() - contact_forces, jump = trialJump();
   Vec masked = residual;
   m.maskResidual(&masked);
-  const double tolerance =
-      jump.isZero(0.0) ? m.forcing(t.report.newton_iterations, masked.norm(), t.residual_before)
-                       : m.options.linear_tolerance;
+  const double wanted =
+      m.options.newton_tolerance * m.forceScale(t.y, t.integrator, t.loads + contact_forces);
+  const double tolerance = jump.isZero(0.0) ? m.forcing(t.report.newton_iterations, masked.norm(),
+                                                        t.residual_before, wanted)
+                                            : m.options.linear_tolerance;
   t.residual_before = masked.norm();
   ++t.report.newton_iterations;
   if (m.newtonDirection(t.y, t.integrator, residual, jump, tolerance, &t.report, &direction))

@@ -198,6 +198,16 @@ TEST(Solver, AStepTakenInPartsSolvesTheSameDirections) {
   EXPECT_LE(iterations[1], 1.1 * iterations[0]);
 }
 
+// No direction is solved further than the step has to come.
+TEST(Solver, DirectionsAreSolvedNoBetterThanTheStep) {
+  int iterations[2] = {0, 0};
+  for (const bool tight : {false, true}) {
+    DeformableBody sheet = makeSheet(SolverKind::kMultigrid, tight ? 1e-12 : 1e-5);
+    for (int k = 0; k < 10; ++k) iterations[tight] += sheet.step(kStep).linear_iterations;
+  }
+  EXPECT_EQ(iterations[0], iterations[1]);
+}
+
 TEST(Solver, SameBytesForAnyNumberOfThreads) {
   for (const SolverKind solver : {SolverKind::kMultigrid, SolverKind::kJacobi}) {
     Vec first;
