@@ -30,6 +30,25 @@ TEST(CrossingPlanes, AWallStaysOneWhereASupportPlaneWouldPassThroughIt) {
   }
 }
 
+// A picture hangs on a wall; a screen stands to the left, nearly as near as the picture.
+TEST(CrossingPlanes, WhatHangsOnASupportPlaneIsNotPartOfWhatStandsBesideIt) {
+  Room room;
+  const auto show = [&](const cv::Rect& where, float away) {
+    room.depth(where) = away, room.scenery(where) = 1.0f / away;
+  };
+  const cv::Rect screen(4, 4, 40, 60), picture(110, 10, 30, 40);
+  show(screen, 0.973f * kWallAway), show(picture, 0.981f * kWallAway);
+  std::vector<SupportPlane> planes = floorPlane();
+  planes.push_back(planes.front());
+  planes.back().normal = -Eigen::Vector3d::UnitY(), planes.back().offset = -kWallAway;
+  const PlaceSurfaces surfaces =
+      findSurfaces(room.scenery, room.depth, room.labels, planes, roomCamera());
+  EXPECT_EQ(surfaces.label.at<std::uint8_t>(30, 20), 3);
+  EXPECT_EQ(cv::countNonZero(surfaces.label(picture) != 2), 0);
+  // Behind the object, between the two, farther from the screen than that may go on.
+  EXPECT_EQ(cv::countNonZero(surfaces.label(cv::Rect(88, 40, 12, 20)) != 2), 0);
+}
+
 TEST(FollowPlanes, WhatIsInventedIsAsNearAsItsPlane) {
   const Room room;
   const PlaceSurfaces surfaces = room.surfaces();

@@ -226,7 +226,7 @@ cv::Mat planesSeen(const cv::Mat& scenery, int supports, const std::vector<Plane
             static_cast<std::int8_t>(planeSeen(planes, supports, near, u, v));
     }
   }
-  leaveStrips(scenery, supports, planes, seen);
+  settleCrossings(scenery, supports, planes, kOffSupport, seen);
   return seen;
 }
 
@@ -234,7 +234,7 @@ cv::Mat planesSeen(const cv::Mat& scenery, int supports, const std::vector<Plane
 void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, const cv::Mat& seen,
                  const std::vector<PicturePlane>& in_picture, const Edges& edges,
                  std::vector<PlaneExtent>& planes) {
-  cv::Mat on_support = cv::Mat::zeros(scenery.size(), CV_8U);
+  cv::Mat on_support = (seen > kNoPlane) & (seen < supports);
   for (int v = 0; v < scenery.rows && supports > 0; ++v) {
     for (int u = 0; u < scenery.cols; ++u) {
       const float near = scenery.at<float>(v, u);
