@@ -138,6 +138,35 @@ TEST(BridgeLines, LeadNoLineThroughAnotherSurface) {
   EXPECT_EQ(b.drawn.at<std::uint8_t>(130, 163), 0);
 }
 
+// A joint between two boards, before the right end of which a curtain hangs.
+struct JointAtCurtain : Lines {
+  cv::Mat boards = cv::Mat(200, 320, CV_8U, cv::Scalar(255));
+
+  LineBridges bridge(const cv::Rect& curtain) {
+    line({0, 100}, {curtain.x, 100});
+    hole(cv::Rect(110, 50, curtain.x - 110, 100)).setTo(255);
+    boards.setTo(0, hole), boards(curtain).setTo(0);
+    image.setTo(cv::Scalar::all(0), hole);
+    return bridgeLines(straightEdges(boards, image), hole, boards, cv::Mat(), image);
+  }
+};
+
+TEST(BridgeLines, LeadALineToWhereItsSurfaceEnds) {
+  JointAtCurtain l;
+  const LineBridges b = l.bridge({180, 0, 140, 200});
+  for (int u = 112; u < 178; ++u) {
+    ASSERT_NE(b.drawn.at<std::uint8_t>(100, u), 0) << u;
+    EXPECT_LT(l.image.at<cv::Vec3f>(100, u)[1], 60.0f) << u;
+  }
+  EXPECT_EQ(cv::countNonZero(b.drawn & (l.hole == 0)), 0);
+}
+
+TEST(BridgeLines, LeadNoLineFartherThanItIsSeen) {
+  JointAtCurtain l;
+  l.boards.colRange(0, 90).setTo(0);
+  EXPECT_EQ(cv::countNonZero(l.bridge({180, 0, 140, 200}).drawn), 0);
+}
+
 // A broad line, of which both edges are found, goes on through what is faint to one of its like,
 // whole and no further.
 TEST(BridgeLines, LeadABroadLineThroughAFaintOne) {

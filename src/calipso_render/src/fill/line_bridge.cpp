@@ -10,6 +10,7 @@
 
 #include "fill/line_band.hpp"
 #include "fill/line_ends.hpp"
+#include "fill/line_to_border.hpp"
 #include "fill/surface_border.hpp"
 
 namespace calipso::render {
@@ -33,8 +34,7 @@ constexpr float kCore = 1.5f;         // px on either side that are the line its
 constexpr float kAlone = 1.0f;        // the same of one that passes before different things
 constexpr LineBand kOwn{kLineHalf, kLineHalf};  // of a line by itself
 constexpr float kCrossFade = 4.0f;              // px on either side of the middle
-// px by which an end of an edge between two surfaces may have been found beside it
-constexpr int kBesideEnd = 3;
+constexpr int kBesideEnd = 3;  // px by which a border's end may have been found beside it
 
 struct Bridge {
   const LineEnd *from, *to;  // to: nothing if it ends at another bridge
@@ -70,17 +70,10 @@ class Bridger {
       if (std::any_of(bridges.begin(), bridges.begin() + through,
                       [&](const Bridge& b) { return b.from == &end || b.to == &end; }))
         continue;
-      if (const auto gap = wayTo(end, bridges, through))
+      if (const auto gap = goesOn(end, bridges, through))
         bridges.push_back({&end, nullptr, *gap, 0.0f, kOwn});
     }
-    // What is led to another line comes before it, which goes through its end; what is weaker comes
-    // first.
-    const auto strength = [](const Bridge& b) {
-      return b.to == nullptr ? kAsStrong * b.from->contrast
-                             : std::min(b.from->contrast, b.to->contrast);
-    };
-    std::stable_sort(bridges.begin(), bridges.end(),
-                     [&](const Bridge& a, const Bridge& b) { return strength(a) < strength(b); });
+    sortByStrength(bridges);
     drawAll(bridges);
     return result_;
   }
@@ -90,10 +83,7 @@ class Bridger {
     ends_ = withBeside(findLineEnds(edges, hole_, source_, image_, false), kBesideEnd, hole_,
                        source_, image_);
     std::vector<Bridge> borders = connections(&Bridger::border);
-    std::stable_sort(borders.begin(), borders.end(), [&](const Bridge& a, const Bridge& b) {
-      return std::min(a.from->contrast, a.to->contrast) <
-             std::min(b.from->contrast, b.to->contrast);
-    });
+    sortByStrength(borders);
     drawAll(borders);
     for (const Bridge& b : borders) {
       if (const auto border = borderAlong(*b.from, *b.to, surface_))
@@ -103,6 +93,16 @@ class Bridger {
   }
 
  private:
+  // The weaker first: what is led to another line comes before that, which goes through its end.
+  static void sortByStrength(std::vector<Bridge>& bridges) {
+    const auto strength = [](const Bridge& b) {
+      return b.to == nullptr ? kAsStrong * b.from->contrast
+                             : std::min(b.from->contrast, b.to->contrast);
+    };
+    std::stable_sort(bridges.begin(), bridges.end(),
+                     [&](const Bridge& a, const Bridge& b) { return strength(a) < strength(b); });
+  }
+
   void drawAll(const std::vector<Bridge>& bridges) {
     const cv::Mat known = image_.clone();
     for (const Bridge& b : bridges) {
@@ -276,10 +276,18 @@ class Bridger {
     return static_cast<float>(hidden) / (steps + 1);
   }
 
-  // The way from a lone end to the nearest connection that it meets, all of it in the hole.
+  // The way from a lone end to what it ends at: another line, or the end of the only surface.
+  std::optional<float> goesOn(const LineEnd& end, const std::vector<Bridge>& bridges,
+                              std::size_t count) const {
+    if (end.contrast < kAloneContrast) return std::nullopt;
+    const auto to_line = end.isThin() && !end.from_afar ? wayTo(end, bridges, count) : std::nullopt;
+    if (to_line || !surface_.empty()) return to_line;
+    return wayToBorder(end, hole_, source_, seenLength(end));
+  }
+
+  // To the nearest connection that it meets, all of it in the hole.
   std::optional<float> wayTo(const LineEnd& end, const std::vector<Bridge>& bridges,
                              std::size_t count) const {
-    if (end.contrast < kAloneContrast || !end.isThin() || end.from_afar) return std::nullopt;
     std::optional<float> nearest;
     for (std::size_t i = 0; i < count; ++i) {
       if (std::min(bridges[i].from->contrast, bridges[i].to->contrast) < kAsStrong * end.contrast)
@@ -297,8 +305,7 @@ class Bridger {
     return nearest;
   }
 
-  // Is the same surface beside the way as beside what is seen of the line? Else another one comes
-  // between.
+  // Is the surface beside the way that beside what is seen of the line? Else another comes between.
   bool staysOnSurface(const LineEnd& end, float way) const {
     if (surface_.empty()) return true;
     for (const float s : {-1.0f * kLineHalf, 1.0f * kLineHalf}) {
