@@ -155,8 +155,12 @@ SeenPlace findPlace(const PlaceSurfaces& surfaces, const RenderParams& params, P
   if (!p.relief.empty())
     place.blind = place.off_planes & ~p.relief.seen, place.off_planes |= p.relief.seen;
   p.shadowless = place.blind.clone();
-  if (!params.depth.empty())
-    p.shadowless |= rimsOff(place.off_planes, p, params) | bladesBefore(p, params);
+  if (!params.depth.empty()) {
+    cv::Mat rims = rimsOff(place.off_planes, p, params);
+    addRims(p.scenery, params.depth, p.relief);
+    if (!p.relief.empty()) rims.setTo(0, p.relief.seen);
+    p.shadowless |= rims | bladesBefore(p, params);
+  }
   p.sunless = turnedAway(p.relief, p.light.light.direction);
   if (!p.sunless.empty()) place.blind |= p.sunless;
   if (!surfaces.empty()) {

@@ -145,17 +145,17 @@ TEST(PrepareBackground, SpecksWithoutSkyKeepNoShadowOff) {
 
 const ShadowMap kOpenSky({}, Eigen::Vector3d::UnitZ(), {});
 
-// They would become a dark line around it; what is within them takes shade as its own surface does.
+// They would become a dark line around it, or a lit one where its own surface is in shade.
 TEST(PrepareBackground, OutermostPixelsOfWhatStandsOnAPlaneTakeNoShadowOfThePlane) {
   BallOverGround place(0.0f);
-  const cv::Rect post(10, 20, 12, 60),
-      within(post.tl() + cv::Point(1, 1), post.size() - cv::Size(2, 2));
+  const cv::Rect post(10, 20, 12, 60);
   place.stand(post);
-  cv::Mat shadowless = place.prepared(true, kOpenSky).shadowless;
-  shadowless(within).setTo(0);
-  const int rim = post.area() - within.area();
-  EXPECT_EQ(cv::countNonZero(shadowless(post)), rim);
-  EXPECT_EQ(cv::countNonZero(shadowless), rim);
+  const Prepared p = place.prepared(true, kOpenSky);
+  EXPECT_EQ(cv::countNonZero((p.shadowless | p.relief.seen)(post)), post.area());
+  EXPECT_EQ(cv::countNonZero(p.relief.seen(post)), post.area());
+  cv::Mat elsewhere = p.shadowless | p.relief.seen;
+  elsewhere(post).setTo(0);
+  EXPECT_EQ(cv::countNonZero(elsewhere), 0);
 }
 
 // Blades of grass before an object's foot: the ground between them is not seen there.

@@ -1,6 +1,8 @@
 #include "place/place_relief.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
 #include "calipso_render/colour.hpp"
 
@@ -11,6 +13,7 @@ constexpr float kLeastSlope = 0.05f;  // cosine between normal and sun of what i
 constexpr float kFullShade = 0.15f;   // of the sun
 constexpr std::size_t kFewest = 50;   // px
 constexpr float kDark = 0.01f;        // linear
+constexpr float kOther = 1.05f;       // times as near as relief beside it: another part of it
 constexpr float kNoShade = 0.9f;      // hardly darker: the shade was not where it was predicted
 
 float brightness(const cv::Vec3f& code) {
@@ -23,6 +26,21 @@ float sunShare(const Light& light, const Eigen::Vector3f& normal) {
   const float shaded = luminance(diffuseShading(light, normal, 0.0f)),
               lit = luminance(diffuseShading(light, normal, 1.0f));
   return (lit - shaded) / std::max(shaded, 1e-4f);
+}
+
+// Of the pixels beside one that are set in a mask the one about as near as `nearness`.
+std::optional<cv::Point> nearestBeside(const cv::Mat& scenery, const cv::Mat& mask, float nearness,
+                                       const cv::Point& at) {
+  const cv::Rect around = cv::Rect(at.x - 1, at.y - 1, 3, 3) & cv::Rect({0, 0}, mask.size());
+  std::optional<cv::Point> best;
+  float least = 1e9f;
+  for (int v = around.y; v < around.br().y; ++v) {
+    for (int u = around.x; u < around.br().x; ++u) {
+      const float off = std::abs(scenery.at<float>(v, u) - nearness);
+      if (mask.at<std::uint8_t>(v, u) != 0 && off < least) least = off, best = cv::Point(u, v);
+    }
+  }
+  return best;
 }
 
 }  // namespace
@@ -43,6 +61,27 @@ Relief findRelief(const PlaceSurfaces& surfaces, const Eigen::Vector3f& sun) {
   relief.seen.setTo(0, turnedAway(relief, sun) & (relief.wall == 0));
   relief.index();
   return relief.box.isEmpty() ? Relief() : relief;
+}
+
+void addRims(const cv::Mat& scenery, const cv::Mat& depth, Relief& relief) {
+  if (relief.empty()) return;
+  const cv::Mat inner = relief.seen.clone();
+  for (int v = 0; v < inner.rows; ++v) {
+    for (int u = 0; u < inner.cols; ++u) {
+      const float behind = scenery.at<float>(v, u), away = depth.at<float>(v, u);
+      if (behind == 0.0f || away == 0.0f) continue;
+      const auto beside = nearestBeside(scenery, inner, 1.0f / away, {u, v});
+      if (!beside) continue;
+      const float own = scenery.at<float>(*beside), off = std::abs(1.0f / away - own);
+      const bool same = inner.at<std::uint8_t>(v, u) != 0 && own < kOther * behind;
+      if (same || off >= std::abs(1.0f / away - behind)) continue;
+      relief.seen.at<std::uint8_t>(v, u) = 255;
+      relief.position.at<cv::Vec3f>(v, u) = relief.position.at<cv::Vec3f>(*beside);
+      relief.normal.at<cv::Vec3f>(v, u) = relief.normal.at<cv::Vec3f>(*beside);
+      relief.wall.at<std::uint8_t>(v, u) = relief.wall.at<std::uint8_t>(*beside);
+    }
+  }
+  relief.index();
 }
 
 cv::Mat turnedAway(const Relief& relief, const Eigen::Vector3f& sun) {

@@ -67,6 +67,11 @@ void followPlanes(const PlaceSurfaces& surfaces, const cv::Mat& invented, cv::Ma
 // only planes take shade, that of the sky
 Relief findRelief(const PlaceSurfaces& surfaces, const Eigen::Vector3f& sun);
 
+// The outermost pixels of what stands out, which the scenery leaves to what is behind it, are the
+// relief's, where the depth image shows them to be nearer to that than to what is behind.
+// @param scenery CV_32FC1, 1/m, 0 unknown @param depth CV_32FC1, m, 0 unknown
+void addRims(const cv::Mat& scenery, const cv::Mat& depth, Relief& relief);
+
 // CV_8UC1: 255 where it faces away from the sun.
 cv::Mat turnedAway(const Relief& relief, const Eigen::Vector3f& sun);
 
