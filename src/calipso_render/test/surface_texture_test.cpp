@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "calipso_render/colour.hpp"
-#include "calipso_render/colour.hpp"
 #include "calipso_render/surface_symmetry.hpp"
 #include "texture/texture_seams.hpp"
 
@@ -63,6 +62,25 @@ TEST(MirrorPlanes, OfABoxAreItsThreeMiddlePlanes) {
     EXPECT_NEAR(p.normal.cwiseAbs().maxCoeff(), 1.0f, 1e-4f);
     EXPECT_NEAR(p.normal.dot(Eigen::Vector3f(1, 2, 3)), p.offset, 1e-4f);
   }
+}
+
+TEST(MirrorPlanes, OfABoxOfTwoTrianglesToASideAreTheSame) {
+  Points vertices;
+  for (int i = 0; i < 8; ++i) vertices.push_back({5.0f * (i & 1), 2.0f * (i & 2), 0.75f * (i & 4)});
+  const std::vector<MirrorPlane> planes = mirrorPlanes(vertices, {{0, 4, 6},
+                                                                  {0, 6, 2},
+                                                                  {1, 3, 7},
+                                                                  {1, 7, 5},
+                                                                  {0, 1, 5},
+                                                                  {0, 5, 4},
+                                                                  {2, 6, 7},
+                                                                  {2, 7, 3},
+                                                                  {0, 2, 3},
+                                                                  {0, 3, 1},
+                                                                  {4, 5, 7},
+                                                                  {4, 7, 6}});
+  ASSERT_EQ(planes.size(), 3u);
+  for (const MirrorPlane& p : planes) EXPECT_NEAR(p.normal.cwiseAbs().maxCoeff(), 1.0f, 1e-4f);
 }
 
 TEST(MirrorPlanes, OfALopsidedShapeAreNone) {

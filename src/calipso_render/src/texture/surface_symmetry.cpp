@@ -139,8 +139,11 @@ std::vector<MirrorPlane> mirrorPlanes(const Points& vertices, const Triangles& t
     const Eigen::Vector3d a = vertices[t[0]].cast<double>(), b = vertices[t[1]].cast<double>(),
                           c = vertices[t[2]].cast<double>();
     const double area = 0.5 * (b - a).cross(c - a).norm();
-    const Eigen::Vector3d centre = (a + b + c) / 3.0;
-    total += area, middle += area * centre, moments += area * centre * centre.transpose();
+    const Eigen::Vector3d sum = a + b + c;
+    total += area, middle += area / 3.0 * sum;
+    // Of all of the triangle, not of its middle: a box has two to a side.
+    moments += area / 12.0 *
+               (a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose());
   }
   if (!(total > 0.0)) return {};
   middle /= total;
