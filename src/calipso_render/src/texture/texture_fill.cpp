@@ -8,7 +8,9 @@
 
 #include "smooth_step.hpp"
 #include "texture/bent_shape.hpp"
+#include "texture/colour_layers.hpp"
 #include "texture/like_places.hpp"
+#include "texture/like_texels.hpp"
 #include "texture/sightings.hpp"
 #include "texture/texture_miss.hpp"
 #include "texture/texture_patches.hpp"
@@ -33,6 +35,7 @@ constexpr float kOwnLow = 0.2f, kOwnHigh = 0.6f;
 // weight of a look at a like place that counts for nothing, and in full
 constexpr float kPoor = 0.15f, kGood = 0.45f;
 
+constexpr float kLikeReach = 2.0f;      // spacings of texels
 constexpr std::size_t kMostTurned = 3;  // turned places that a place takes its look from
 // texels, about, by which like places are judged; of the stock model, where that takes longer
 constexpr std::size_t kCompared = 20000, kComparedOfStock = 5000;
@@ -44,20 +47,6 @@ std::size_t mostTexels(const Camera& camera, std::size_t views) {
 }
 
 cv::Vec3f colourOf(const cv::Vec4f& c) { return {c[0], c[1], c[2]}; }
-
-// Colours laid one over the other: each takes up a part of what those before it left open.
-struct Layers {
-  cv::Vec3f sum;
-  float open = 1.0f, most = 0.0f;
-  int count = 0, strongest = -1;  // layers so far; the one that took up most
-
-  void add(const cv::Vec3f& colour, float part) {
-    sum += colour * (open * part);
-    if (open * part > most) most = open * part, strongest = count;
-    open *= 1.0f - part;
-    ++count;
-  }
-};
 
 // How one of the pictures shows a place.
 struct Look {
@@ -100,6 +89,7 @@ class TextureFill {
         shown_[i] = sharpened(shown_[i], pictures_[i], *actors_[i], a.texture);
     }
     makeTexels(a.texture, origins);
+    if (views_.size() > 1) copyLike(a.texture, origins);
     if (views_.size() > 1) a.grain = grainOf({views_, actors_, pictures_}, a.texture);
     auto& [from, certain, layer] = origins;
     levelSeams(surface_.key_vertices, surface_.triangles, layer, a.texture);
@@ -323,6 +313,49 @@ class TextureFill {
                   std::clamp(key / kEnough, 0.0f, 1.0f) * smoothStep(kOwnLow, kOwnHigh, key_share));
     if (total > kSeen) return key > 0.0f ? kKey : kElsewhere;
     return certain > 0.5f ? kCopied : kFilled;
+  }
+
+  // Like places that other frames than the key frame show, of what is at best seen at a flat angle:
+  // from the texels that they have become.
+  void copyLike(SurfaceTexture& texture, Origins& origins) const {
+    const auto forEach = [&](auto act) {
+      for (int t = 0; t < texture.triangleCount(); ++t) {
+        for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) act(t, i);
+      }
+    };
+    const auto placeAt = [&](int t, std::size_t i) {
+      return shapePlaceOf(t, texture.weightsOf(t, i - texture.firstOf(t)));
+    };
+    const auto isPoor = [&](std::size_t i) {
+      return origins.layer[i] < 0 || origins.layer[i] > static_cast<int>(like_.size());
+    };
+    std::vector<KnownTexels::Texel> known;
+    std::vector<std::pair<int, std::size_t>> poor;
+    forEach([&](int t, std::size_t i) {
+      if (isPoor(i)) poor.push_back({t, i});
+    });
+    if (like_.empty() || poor.empty()) return;
+    forEach([&](int t, std::size_t i) {
+      if (origins.layer[i] != 0 || origins.certain[i] < 1.0f) return;
+      Place place = placeAt(t, i);
+      place.part = sightings_.partOf(t);
+      known.push_back({place, colourOf(texture.texels[i])});
+    });
+    if (known.empty()) return;
+    const KnownTexels texels(std::move(known), kLikeReach * texture.spacing());
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::size_t k = 0; k < poor.size(); ++k) {
+      const auto& [t, i] = poor[k];
+      const Place place = placeAt(t, i);
+      for (std::size_t j = 0; j < like_.size(); ++j) {
+        const auto colour = texels.at(like_[j].of(place));
+        if (!colour) continue;
+        texture.texels[i] = cv::Vec4f((*colour)[0], (*colour)[1], (*colour)[2], 0.0f);
+        origins.certain[i] = 1.0f, origins.layer[i] = static_cast<signed char>(j + 1);
+        origins.from[i] = kCopied;
+        break;
+      }
+    }
   }
 
   // What is seen at a flat angle, at the mask's rim (where the background's colour is in it) or not
