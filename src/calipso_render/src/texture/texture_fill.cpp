@@ -315,8 +315,7 @@ class TextureFill {
     return certain > 0.5f ? kCopied : kFilled;
   }
 
-  // Like places that other frames than the key frame show, of what is at best seen at a flat angle:
-  // from the texels that they have become.
+  // Of what is at best seen at a flat angle: from texels that other frames than the key frame told.
   void copyLike(SurfaceTexture& texture, Origins& origins) const {
     const auto forEach = [&](auto act) {
       for (int t = 0; t < texture.triangleCount(); ++t) {
@@ -336,7 +335,8 @@ class TextureFill {
     });
     if (like_.empty() || poor.empty()) return;
     forEach([&](int t, std::size_t i) {
-      if (origins.layer[i] != 0 || origins.certain[i] < 1.0f) return;
+      const bool in_key = looks_[t].texels[i - texture.firstOf(t)].key >= kGood;
+      if (in_key || origins.layer[i] != 0 || origins.certain[i] < 1.0f) return;
       Place place = placeAt(t, i);
       place.part = sightings_.partOf(t);
       known.push_back({place, colourOf(texture.texels[i])});
