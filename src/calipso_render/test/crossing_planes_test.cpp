@@ -1,4 +1,4 @@
-// Support planes that pass through walls, and how near what is invented is.
+// Support planes that pass through walls, rims, and how near what is invented is.
 
 #include <gtest/gtest.h>
 
@@ -47,6 +47,29 @@ TEST(CrossingPlanes, WhatHangsOnASupportPlaneIsNotPartOfWhatStandsBesideIt) {
   EXPECT_EQ(cv::countNonZero(surfaces.label(picture) != 2), 0);
   // Behind the object, between the two, farther from the screen than that may go on.
   EXPECT_EQ(cv::countNonZero(surfaces.label(cv::Rect(88, 40, 12, 20)) != 2), 0);
+}
+
+// The scenery leaves the outermost pixels of a block to the floor and wall behind it.
+TEST(PlaceRelief, TheOutermostPixelsOfWhatStandsOutAreItsOwn) {
+  Room room;
+  const cv::Rect block(110, 30, 30, 40), around(106, 26, 38, 48);
+  room.depth(block) = 1.5f;
+  room.labels(kObject) = 0, room.depth(kObject) = 1.5f;
+  cv::Mat(1.0f / room.depth).copyTo(room.scenery);
+  cv::erode(room.scenery, room.scenery, cv::Mat::ones(3, 3, CV_8U));
+  Relief relief = findRelief(room.surfaces(), -Eigen::Vector3f::UnitY());
+  const int number = relief.wall.at<std::uint8_t>(50, 125);
+  addRims(room.scenery, room.depth, relief);
+  for (int v = around.y; v < around.br().y; ++v) {
+    for (int u = around.x; u < around.br().x; ++u) {
+      const bool on_block = block.contains({u, v});
+      ASSERT_EQ(relief.at(u, v) && relief.wall.at<std::uint8_t>(v, u) == number, on_block)
+          << u << ", " << v;
+      if (on_block) {
+        EXPECT_NEAR(relief.receiver(u, v).position.y(), 1.5f, 0.02f) << u << ", " << v;
+      }
+    }
+  }
 }
 
 TEST(FollowPlanes, WhatIsInventedIsAsNearAsItsPlane) {

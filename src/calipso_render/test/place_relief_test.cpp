@@ -213,29 +213,6 @@ TEST(PlaceRelief, IsNoneWhereNothingStandsAndWhereWhatIsCurvedTurnsAway) {
   EXPECT_TRUE(findRelief(surfaces, Eigen::Vector3f(0.0f, 0.6f, 0.8f)).empty());
 }
 
-// The scenery leaves the outermost pixels of a block to the floor and wall behind it.
-TEST(PlaceRelief, TheOutermostPixelsOfWhatStandsOutAreItsOwn) {
-  Room room;
-  const cv::Rect block(110, 30, 30, 40), around(106, 26, 38, 48);
-  room.depth(block) = 1.5f;
-  room.labels(kObject) = 0, room.depth(kObject) = 1.5f;
-  cv::Mat(1.0f / room.depth).copyTo(room.scenery);
-  cv::erode(room.scenery, room.scenery, cv::Mat::ones(3, 3, CV_8U));
-  Relief relief = findRelief(room.surfaces(), -Eigen::Vector3f::UnitY());
-  const int number = relief.wall.at<std::uint8_t>(50, 125);
-  addRims(room.scenery, room.depth, relief);
-  for (int v = around.y; v < around.br().y; ++v) {
-    for (int u = around.x; u < around.br().x; ++u) {
-      const bool on_block = block.contains({u, v});
-      ASSERT_EQ(relief.at(u, v) && relief.wall.at<std::uint8_t>(v, u) == number, on_block)
-          << u << ", " << v;
-      if (on_block) {
-        EXPECT_NEAR(relief.receiver(u, v).position.y(), 1.5f, 0.02f) << u << ", " << v;
-      }
-    }
-  }
-}
-
 TEST(PlaceRelief, WhatIsBehindAnObjectIsNotBeforeIt) {
   Room room;
   room.depth(kObject) = 3.5f;  // seen through a hole in the wall
