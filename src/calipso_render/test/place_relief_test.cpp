@@ -388,5 +388,39 @@ TEST(PlanesInLight, IsAsSoftAsAPixelOffThePlanes) {
   EXPECT_EQ(cv::norm(levelsIn(part), levels(part - wall.tl()), cv::NORM_INF), 0.0);
 }
 
+// A light that nothing beyond the wall has.
+class LightBefore : public Visibility {
+ public:
+  float visibility(const Eigen::Vector3f& p, const Eigen::Vector3f&) const override {
+    return p.y() < kWallAway + 0.5f ? 1.0f : 0.0f;
+  }
+  bool empty() const override { return false; }
+  std::optional<float> uniform(const Eigen::Vector3f&, const Eigen::Vector3f&,
+                               float) const override {
+    return std::nullopt;
+  }
+};
+
+// Where one surface ends before another the picture mixes both.
+TEST(PlanesInLight, IsAsSoftAsAPixelWhereASurfaceEnds) {
+  constexpr int kEnds = 43;  // column: half of the wall is a metre farther away
+  Relief relief = findRelief(Room().surfaces(), kSun);
+  for (int v = 0; v < relief.seen.rows; ++v) {
+    for (int u = kEnds; u < relief.seen.cols; ++u) {
+      cv::Vec3f& at = relief.position.at<cv::Vec3f>(v, u);
+      at[0] *= (kWallAway + 1.0f) / kWallAway, at[1] = kWallAway + 1.0f;
+    }
+  }
+  const PlaceView view(PlaneView(floorPlane(), roomCamera()), relief);
+  const cv::Rect wall(3, 5, 150, 60);
+  cv::Mat levels(wall.size(), CV_8U, cv::Scalar(255));
+  planesInLight(view, LightBefore(), wall, SquareMask(), levels);
+  const std::uint8_t expected[] = {255, 191, 64, 0};  // weights 1, 2, 1 of the columns around
+  for (int v = 1; v + 1 < levels.rows; ++v) {
+    for (int k = 0; k < 4; ++k)
+      ASSERT_NEAR(levels.at<std::uint8_t>(v, kEnds - 2 + k - wall.x), expected[k], 1) << v << k;
+  }
+}
+
 }  // namespace
 }  // namespace calipso::render

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "calipso_render/sky_map.hpp"
 #include "draw/eight_lanes.hpp"
@@ -20,6 +21,8 @@ constexpr float kCorner = -0.5f;  // px from a pixel to its first corner
 constexpr float kEven = 0.05f;
 // of visibility: between places that differ by no more it is interpolated
 constexpr float kSlow = 0.3f;
+// times as far off a pixel's plane as the nearest pixel beside it is away: another surface
+constexpr float kEnds = 2.0f;
 constexpr float kUnseen = -1.0f;  // visibility of a light where nothing takes its shadows
 
 class Squares {
@@ -246,10 +249,38 @@ class Squares {
       }
       return high - low > kSlow;
     }
+
+    // Mean of the pixel and those around it, the nearer the more.
+    float meanAround(int x, int y) const {
+      float sum = 0.0f, weights = 0.0f;
+      for (int j = 0; j < 3; ++j) {
+        for (int i = 0; i < 3; ++i) {
+          const float seen = visible[y + j][x + i],
+                      weight = static_cast<float>((2 - std::abs(i - 1)) * (2 - std::abs(j - 1)));
+          if (seen != kUnseen) sum += weight * seen, weights += weight;
+        }
+      }
+      return sum / weights;
+    }
   };
 
+  // Does the surface that a pixel sees end beside it? Then the picture mixes both there.
+  bool endsBeside(int u, int v) const {
+    Receiver own{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()}, other = own;
+    if (!view_.at(static_cast<float>(u), static_cast<float>(v), own)) return false;
+    float least = std::numeric_limits<float>::max(), off = 0.0f;
+    for (const cv::Point d : {cv::Point(1, 0), {0, 1}, {-1, 0}, {0, -1}}) {
+      if (!view_.at(static_cast<float>(u + d.x), static_cast<float>(v + d.y), other)) continue;
+      const Eigen::Vector3f way = other.position - own.position;
+      least = std::min(least, way.norm());
+      off = std::max(off, std::abs(own.normal.dot(way)));
+    }
+    return off > kEnds * least;
+  }
+
   // Every pixel on its own: the relief, or several planes. Those at a shadow's border have the mean
-  // of what their corners see, as on planes. What sees neither keeps its value.
+  // of what their corners see, as on planes; where a surface ends, too, that of all around. What sees
+  // neither keeps its value.
   void fillExactly(const cv::Rect& square, const cv::Rect& here) const {
     const cv::Rect own = here + rect_.tl() - square.tl();  // of the square's pixels
     Exact exact;
@@ -277,7 +308,10 @@ class Squares {
     for (int y = own.y; y < own.br().y; ++y) {
       for (int x = own.x; x < own.br().x; ++x) {
         const float* c = corners[y][x];
-        if (mixed[y][x]) visible[y][x] = 0.25f * (c[0] + c[1] + c[2] + c[3]);
+        if (mixed[y][x])
+          visible[y][x] = endsBeside(square.x + x, square.y + y)
+                              ? exact.meanAround(x, y)
+                              : 0.25f * (c[0] + c[1] + c[2] + c[3]);
       }
     }
     write(square, here, visible);
