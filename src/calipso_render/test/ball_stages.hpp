@@ -42,8 +42,8 @@ struct BallStages {
   cv::Mat removed;
   DrawnSurfaces surfaces;
 
-  explicit BallStages(const Eigen::Vector3f& move, const RenderParams& render = params())
-      : render(render),
+  explicit BallStages(const Eigen::Vector3f& move, const RenderParams& given = params())
+      : render(given),
         input(setting.input(true, move)),
         frame(*prepared, render, input),
         place(frame),
