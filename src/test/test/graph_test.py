@@ -124,7 +124,7 @@ class Graph(unittest.TestCase):
         self.assertEqual([o.reason for o in plan.objects if o.object == "banana1"], ["edit 'velocity'"])
         moved = [t for m in clips.messages(out, "/tf") for t in m.transforms if t.child_frame_id == "object/banana1"]
         self.assertEqual([t.header.stamp for t in moved], [last])
-        drawn = [m for a in clips.messages(out, "/calipso/markers") for m in a.markers if m.ns == "contacts"]
+        drawn = [m for a in clips.messages(out, "/calipso/markers") for m in a.markers if m.ns == "surface"]
         self.assertEqual(max(m.header.stamp for m in drawn), last)
 
     def wait_for_publisher(self, topic, timeout_sec=60):
