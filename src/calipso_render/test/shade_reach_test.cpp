@@ -151,6 +151,9 @@ TEST(Renderer, TheShadowOfWhatFollowsTheVideoIsTheVideos) {
   shadow.setTo(0, around);
   ASSERT_GT(cv::countNonZero(shadow), 100);
   EXPECT_EQ(cv::norm(renderer.composite(in).bgr, last.bgr, cv::NORM_INF, shadow), 0.0);
+  FrameInput in_evening = in;
+  in_evening.sun.direction = Eigen::Vector3f(-0.8f, 0.3f, 0.4f);
+  EXPECT_GT(cv::norm(renderer.composite(in_evening).bgr, last.bgr, cv::NORM_INF, shadow), 20.0);
   for (Eigen::Vector3f& x : in.objects[0].vertices) x.y() += 0.05f;
   EXPECT_GT(cv::norm(renderer.composite(in).bgr, last.bgr, cv::NORM_INF, shadow), 20.0);
 }

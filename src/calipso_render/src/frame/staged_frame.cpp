@@ -140,7 +140,8 @@ std::optional<Points> observedPlace(const StagedFrame& frame, int surface) {
 bool isAsObserved(const StagedFrame& frame, const StagedObject& object) {
   const auto& observed = frame.observed[object.surface];
   const Points& now = object.actor.vertices;
-  if (!frame.params.keep_still || !object.edited || !observed || observed->size() != now.size())
+  if (!frame.params.keep_still || frame.input.sun.changes() || !object.edited || !observed ||
+      observed->size() != now.size())
     return false;
   const auto focal = static_cast<float>(frame.input.camera.fx);
   for (std::size_t i = 0; i < now.size(); ++i) {
