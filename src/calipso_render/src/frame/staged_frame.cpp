@@ -136,12 +136,12 @@ std::optional<Points> observedPlace(const StagedFrame& frame, int surface) {
   return frame.isSeenAt(surface, vertices) ? std::optional<Points>(vertices) : std::nullopt;
 }
 
-// Whether an edited object is where the video has it as it moves.
+// Whether an edited object is where the video has it as it moves, under the video's sun.
 bool isAsObserved(const StagedFrame& frame, const StagedObject& object) {
   const auto& observed = frame.observed[object.surface];
   const Points& now = object.actor.vertices;
-  if (!frame.params.keep_still || frame.input.sun.changes() || !object.edited || !observed ||
-      observed->size() != now.size())
+  if (!frame.params.keep_still || !object.edited || !observed || observed->size() != now.size() ||
+      frame.light.direction != frame.prepared.light.light.direction)
     return false;
   const auto focal = static_cast<float>(frame.input.camera.fx);
   for (std::size_t i = 0; i < now.size(); ++i) {

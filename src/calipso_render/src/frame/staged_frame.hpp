@@ -55,8 +55,8 @@ struct StagedFrame {
   // per surface: where the video has one that is edited and moves in it, if its state says so and
   // it is seen there; world, m
   std::vector<std::optional<Points>> observed;
-  // per surface: edited, but where the video has it as it moves, as its looks alone are edited, and
-  // under the video's sun: its shade is the video's
+  // per surface: edited, but where the video has it as it moves, and the sun, as looks alone are
+  // edited: its shade is the video's
   std::vector<bool> follows;
 
   cv::Rect whole() const { return {{0, 0}, input.bgr.size()}; }
