@@ -1,4 +1,3 @@
-#include <ros/package.h>
 #include <unistd.h>
 
 #include <cerrno>
