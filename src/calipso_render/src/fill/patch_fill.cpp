@@ -52,9 +52,8 @@ class Filling {
         cost_(hole_.size(), CV_32F, cv::Scalar(0.0f)),
         plain_(hole_.size(), CV_8U, cv::Scalar(0)),
         bands_((hole_.rows + kBandRows - 1) / kBandRows) {
-    const cv::Mat patch = cv::Mat::ones(kPatchSide, kPatchSide, CV_8U);
     cv::Mat touched;
-    cv::dilate(hole_, touched, patch);
+    cv::dilate(hole_, touched, cv::Mat::ones(kPatchSide, kPatchSide, CV_8U));
     for (int v = kPatchRadius; v + kPatchRadius < hole_.rows; ++v) {
       for (int u = kPatchRadius; u + kPatchRadius < hole_.cols; ++u) {
         if (touched.at<std::uint8_t>(v, u) != 0) bands_[v / kBandRows].emplace_back(u, v);
@@ -107,14 +106,11 @@ class Filling {
         if (sources_.contains(near)) to_.at<cv::Vec2s>(p) = shorts(near);
       }
     });
-    if (scale_ > 1.0f)
-      vote();
-    else
-      copy();
+    scale_ > 1.0f ? vote() : copy();
   }
 
-  // Peels anew what was led off its surface, or nowhere: coarser levels have fewer whole patches and
-  // nothing thin, and finer ones look no farther than around what those found.
+  // Peels anew what was led off its surface, or nowhere: coarser levels have fewer whole patches
+  // and nothing thin, and finer ones look no farther than around what those found.
   void peelMisled() {
     cv::Mat misled = cv::Mat::zeros(hole_.size(), CV_8U);
     for (int v = 0; v < hole_.rows; ++v) {
