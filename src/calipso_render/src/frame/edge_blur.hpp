@@ -13,8 +13,8 @@ namespace calipso::render {
 // @return standard deviation, px; the usual one where too few places tell it
 float outlineBlur(const cv::Mat& picture, const cv::Mat& labels);
 
-// The same of their colours beside their brightness, in code values: video codecs keep those at half
-// the size, and coarser.
+// The same of their colours beside their brightness, in code values: video codecs keep those at
+// half the size, and coarser.
 // @return standard deviation, px; 0 where too few places tell it
 float colourBlur(const cv::Mat& picture, const cv::Mat& labels);
 

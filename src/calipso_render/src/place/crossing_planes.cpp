@@ -24,8 +24,8 @@ cv::Mat crossing(const cv::Mat& scenery, const PlaneExtent& other, const cv::Mat
   return both;
 }
 
-// Of what both explain the pieces apart from what one of them alone explains: where a wall stands on
-// a support they hang together.
+// Of what both explain the pieces apart from what one of them alone explains: where a wall stands
+// on a support they hang together.
 cv::Mat apartFrom(const cv::Mat& alone, const cv::Mat& both) {
   cv::Mat pieces, beside, apart = cv::Mat::zeros(both.size(), CV_8U);
   const int count = cv::connectedComponents(both, pieces, 8, CV_32S);
