@@ -20,9 +20,9 @@ struct LineBridges {
 
 // Continues straight edges and lines through a hole: those that enter it at two places, on one line
 // and with the same colours across, are connected; one that meets such a connection within the hole
-// goes on to it, unless another surface comes between; one whose surface ends there goes on to where
-// that does. What lies a few pixels beside the line is drawn with it, mirrored from outside the
-// hole, so that it keeps its grain.
+// goes on to it, unless another surface comes between; one whose surface ends there goes on to
+// where that does. What lies a few pixels beside the line is drawn with it, mirrored from outside
+// the hole, so that it keeps its grain.
 // @param edges straightEdges() of the picture
 // @param image CV_32FC3, code values; drawn upon
 // @param hole, source CV_8UC1: to be filled; known

@@ -17,7 +17,7 @@ class KnownTexels {
     cv::Vec3f colour;
   };
 
-  // @param reach m: a place's look is that of the nearest texel within it
+  // @param texels at least one @param reach m: a place's look is that of the nearest within it
   KnownTexels(std::vector<Texel> texels, float reach);
 
   // Nothing where no known texel of the same face is near, or less of the sky is open to it.
