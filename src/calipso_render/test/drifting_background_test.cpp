@@ -247,6 +247,33 @@ TEST(DriftingBackground, IsFoundInWidePictures) {
   EXPECT_NEAR(shift->y, larger * kPace.y * (kFrames - 1), 0.3);
 }
 
+// Sky over hills, whose pattern is as mild as smooth: where they count the sky seems to rest as well.
+TEST(DriftingBackground, IsFollowedWhereMostOfThePictureRests) {
+  constexpr int kSkyline = 90;
+  constexpr double kMild = 0.4;  // contrast of the sky
+  std::vector<ClipFrame> frames = clipOf(Motion::kDrifts, {150, 30, 30, 40});
+  cv::Mat hills(kHigh, kWide, CV_32FC3);
+  cv::RNG(3).fill(hills, cv::RNG::NORMAL, 0.0, 130.0);
+  cv::GaussianBlur(hills, hills, {}, 3.0);
+  hills += cv::Scalar(70, 90, 80);
+  for (ClipFrame& f : frames) {
+    cv::Mat noise(hills.size(), CV_32FC3);
+    cv::RNG(f.stamp_ns).fill(noise, cv::RNG::NORMAL, 0.0, 1.5);
+    f.bgr.convertTo(f.bgr, CV_8U, kMild, 100.0);
+    cv::Mat(hills + noise)
+        .rowRange(kSkyline, kHigh)
+        .convertTo(f.bgr.rowRange(kSkyline, kHigh), CV_8U);
+    f.labels.rowRange(kSkyline, kHigh) = 0;
+  }
+  const DriftingBackground drifting(frames, 2, cv::Mat());
+  ASSERT_TRUE(drifting.established());
+  const auto shift = drifting.shiftAt(33'000'000LL * 12);
+  ASSERT_TRUE(shift);
+  EXPECT_NEAR(shift->x, kPace.x * 12.0f, 0.1);
+  EXPECT_NEAR(shift->y, kPace.y * 12.0f, 0.1);
+  EXPECT_LT(cv::countNonZero(drifting.where().rowRange(kSkyline + 4, kHigh)), 50) << "hills rest";
+}
+
 TEST(DriftingBackground, NothingDriftsWhereThePlaceRestsOrRipples) {
   EXPECT_FALSE(DriftingBackground(clipOf(Motion::kRests), 2, cv::Mat()).established());
   EXPECT_FALSE(DriftingBackground(clipOf(Motion::kRipples), 2, cv::Mat()).established());

@@ -20,6 +20,7 @@ constexpr float kMostOff = 20.0f;  // code values: what is off by more counts as
 constexpr int kFewestPoints = 60;  // that change
 constexpr std::size_t kMostPoints = 5000;  // by which a displacement is judged
 constexpr float kGuessed = 0.5f;           // part of the differences that a guess may leave
+constexpr int kJudged = 15;                // px across: differences are judged together
 constexpr float kLeastWay = 3.0f;          // px that it has to come in the clip
 constexpr int kStride = 2;                 // px between places by which frames are registered
 constexpr double kFarStep = 16.0;          // px, of one of them: astray
@@ -167,6 +168,26 @@ std::vector<cv::Point2f> followed(const std::vector<DriftPicture>& pictures,
   return shifts;
 }
 
+// Where the first picture comes nearer to the second one by a displacement than at rest. CV_8UC1
+cv::Mat explainedBy(const DriftPicture& from, const DriftPicture& to, const cv::Point2f& way) {
+  const cv::Size size = from.grey.size(), around(kJudged, kJudged);
+  cv::Mat resting, drifting, hidden;
+  cv::absdiff(from.grey, to.grey, resting);
+  cv::absdiff(from.grey, displaced(to.grey, way, size), drifting);
+  to.covered.convertTo(hidden, CV_32F);
+  hidden = (displaced(hidden, way, size) > 0.0f) | from.covered | to.covered;
+  resting.setTo(0.0f, hidden), drifting.setTo(0.0f, hidden);
+  cv::boxFilter(resting, resting, -1, around), cv::boxFilter(drifting, drifting, -1, around);
+  return (drifting < kGuessed * resting) & ~hidden;
+}
+
+Drift driftNear(const std::vector<DriftPicture>& pictures, const cv::Point2f& pace,
+                const cv::Mat& only, const cv::Mat& ground) {
+  Drift drift{followed(pictures, pace, only), {}};
+  drift.where = whereDrifting(pictures, drift.shifts, ground);
+  return drift;
+}
+
 }  // namespace
 
 cv::Mat displaced(const cv::Mat& image, const cv::Point2f& by, const cv::Size& out) {
@@ -204,8 +225,11 @@ Drift findDrift(const std::vector<ClipFrame>& frames, const std::vector<cv::Mat>
     const auto way = guess(pictures.front(), pictures[last]);
     if (!way) continue;
     const cv::Point2f pace = *way / static_cast<float>(last);
-    Drift drift{followed(pictures, pace, cv::Mat()), {}};
-    drift.where = whereDrifting(pictures, drift.shifts, ground);
+    Drift drift = driftNear(pictures, pace, cv::Mat(), ground);
+    if (drift.where.empty()) {  // most of the picture may rest
+      const cv::Mat explained = explainedBy(pictures.front(), pictures[last], *way);
+      drift = driftNear(pictures, pace, explained, ground);
+    }
     if (drift.where.empty()) return {};
     cv::Mat within;  // off the borders of what rests
     cv::erode(drift.where, within, cv::Mat::ones(2 * kOff + 1, 2 * kOff + 1, CV_8U));
