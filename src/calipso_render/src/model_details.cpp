@@ -309,6 +309,18 @@ Points withDetails(const Surface& surface, Points vertices) {
   return vertices;
 }
 
+Points withoutDetails(const Surface& surface, const Points& vertices) {
+  return {vertices.begin(), vertices.end() - static_cast<long>(surface.detailVertices())};
+}
+
+Triangles modelTriangles(const Surface& surface) {
+  Triangles triangles;
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+    if (!isDetail(surface, static_cast<int>(t))) triangles.push_back(surface.triangles[t]);
+  }
+  return triangles;
+}
+
 bool isDetail(const Surface& surface, int triangle) {
   const std::size_t of_model = surface.key_vertices.size() - surface.detailVertices();
   return surface.triangles[triangle][0] >= static_cast<int>(of_model);

@@ -23,6 +23,10 @@ bool addDetails(const View& key, const cv::Mat& depth, const cv::Mat& nearness,
 // @param vertices world, m
 Points withDetails(const Surface& surface, Points vertices);
 
+// Those of the model alone.
+Points withoutDetails(const Surface& surface, const Points& vertices);
+Triangles modelTriangles(const Surface& surface);
+
 bool isDetail(const Surface& surface, int triangle);
 
 }  // namespace calipso::render

@@ -126,7 +126,8 @@ TEST(LikePlaces, MirroredAreOfTheMirroredPart) {
   const std::vector<int> parts = connectedParts(surface.key_vertices, surface.triangles);
   const int left = parts[0], middle = parts[triangles], right = parts[2 * triangles];
   bool across = false;
-  for (const LikePlace& like : mirroredPlaces(surface.key_vertices, surface.triangles, parts)) {
+  for (const LikePlace& like : mirroredPlaces(mirrorPlanes(surface.key_vertices, surface.triangles),
+                                              surface.key_vertices, surface.triangles, parts)) {
     const Eigen::Vector3f x(-3.0f * static_cast<float>(kBallRadius), 0.0f, 0.0f);
     const Place image = like.of({x, Eigen::Vector3f::UnitX(), left});
     const bool changes = image.point.x() > 0.0f;

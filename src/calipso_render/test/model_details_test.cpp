@@ -111,6 +111,23 @@ TEST(ModelDetails, WhatIsAsFarAsThePlaceIsNoDetail) {
   EXPECT_EQ(prepared->surfaces[0].detailVertices(), 0u);
 }
 
+// A detail is found where the camera sees it: the model is as symmetric as it was without.
+TEST(ModelDetails, TheModelStaysSymmetric) {
+  RailSetting s;
+  const cv::Rect flag(s.rail.tl(), cv::Size(40, 30));
+  s.key.labels(flag).setTo(kBallLabel), s.key.bgr(flag).setTo(kGreen);
+  s.depth(flag).setTo(s.depthOf(kCentre.cast<float>()));
+  const auto with = s.prepared(s.depth), without = s.prepared({});
+  ASSERT_GT(with->surfaces[0].detailVertices(), 0u);
+  EXPECT_EQ(withoutDetails(with->surfaces[0], with->surfaces[0].key_vertices),
+            without->surfaces[0].key_vertices);
+  EXPECT_EQ(modelTriangles(with->surfaces[0]), without->surfaces[0].triangles);
+  const float copied = without->appearances[0].copied * without->appearances[0].texture.size(),
+              still = with->appearances[0].copied * with->appearances[0].texture.size();
+  EXPECT_GT(copied, 100.0f);
+  EXPECT_NEAR(still, copied, 0.1f * copied);
+}
+
 TEST(ModelDetails, TheyTurnWithTheModel) {
   const RailSetting s;
   const auto prepared = s.prepared(s.depth);

@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "calipso_render/surface_symmetry.hpp"
 #include "smooth_step.hpp"
 #include "texture/mesh_topology.hpp"
 
@@ -107,13 +106,14 @@ std::map<int, int> mirroredParts(const PartBoxes& boxes, const PartBoxes& mirror
 
 }  // namespace
 
-std::vector<LikePlace> mirroredPlaces(const Points& vertices, const Triangles& triangles,
+std::vector<LikePlace> mirroredPlaces(const std::vector<MirrorPlane>& planes,
+                                      const Points& vertices, const Triangles& triangles,
                                       const std::vector<int>& parts) {
   const PartBoxes boxes =
       boxesOf(vertices, triangles, parts, [](const Eigen::Vector3f& p) { return p; });
   const float apart = kSameBox * boxOf(vertices).diagonal().norm();
   std::vector<LikePlace> like;
-  for (const MirrorPlane& plane : mirrorPlanes(vertices, triangles)) {
+  for (const MirrorPlane& plane : planes) {
     const PartBoxes mirrored = boxesOf(vertices, triangles, parts,
                                        [&](const Eigen::Vector3f& p) { return plane.point(p); });
     like.push_back({[plane, images = mirroredParts(boxes, mirrored, apart)](const Place& place) {

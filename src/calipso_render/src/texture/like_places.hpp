@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "calipso_render/surface_symmetry.hpp"
 #include "texture/sightings.hpp"
 
 namespace calipso::render {
@@ -17,8 +18,9 @@ struct LikePlace {
   bool agreesWell() const { return agrees && *agrees >= 0.7f; }
 };
 
-// The mirror images at the planes of symmetry. @param parts connectedParts()
-std::vector<LikePlace> mirroredPlaces(const Points& vertices, const Triangles& triangles,
+// The mirror images at planes of symmetry. @param parts connectedParts()
+std::vector<LikePlace> mirroredPlaces(const std::vector<MirrorPlane>& planes,
+                                      const Points& vertices, const Triangles& triangles,
                                       const std::vector<int>& parts);
 
 // Of a body of revolution: places turned about its axis. First back and forth, into the quarter of a

@@ -6,6 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "calipso_render/surface_symmetry.hpp"
+#include "model_details.hpp"
 #include "smooth_step.hpp"
 #include "texture/bent_shape.hpp"
 #include "texture/colour_layers.hpp"
@@ -250,8 +252,12 @@ class TextureFill {
 
   Likenesses likenessesOf(const Points& vertices) const {
     const Eigen::Vector3f eye = views_[0]->camera.world_from_camera.translation().cast<float>();
-    return {mirroredPlaces(vertices, surface_.triangles, sightings_.parts()),
-            turnedPlaces(vertices, surface_.triangles, eye)};
+    // What the model lacks is found where the camera sees it: that is symmetric to nothing.
+    const Points of_model = withoutDetails(surface_, vertices);
+    const Triangles triangles = modelTriangles(surface_);
+    return {mirroredPlaces(mirrorPlanes(of_model, triangles), vertices, surface_.triangles,
+                           sightings_.parts()),
+            turnedPlaces(of_model, triangles, eye)};
   }
 
   // Of the object's shape, or of its stock model's where that has more of them: bent things are as
@@ -273,7 +279,7 @@ class TextureFill {
     std::vector<KnownPlace> known;
     const std::size_t step = 1 + texture.size() / (bent_ ? kComparedOfStock : kCompared);
     std::size_t next = 0;
-    for (int t = 0; t < texture.triangleCount(); ++t) {
+    for (int t = 0; t < texture.triangleCount() && !isDetail(surface_, t); ++t) {
       for (; next < texture.firstOf(t + 1); next += step) {
         if (origins.layer[next] == 0 && origins.certain[next] >= 1.0f)
           known.push_back({shapePlaceOf(t, texture.weightsOf(t, next - texture.firstOf(t))),
@@ -369,6 +375,7 @@ class TextureFill {
     };
     for (const LikePlace& like : like_) {
       if (layers.open == 0.0f) return;
+      if (isDetail(surface_, triangle)) break;
       const Sighting l = lookAtShape(like.of(place));
       const float good = smoothStep(kPoor, kGood, l.weight);
       add(l, good > 0.0f ? good * sightings_.asOpen(0, l, place) : 0.0f);
