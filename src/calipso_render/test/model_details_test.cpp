@@ -128,6 +128,39 @@ TEST(ModelDetails, TheModelStaysSymmetric) {
   EXPECT_NEAR(still, copied, 0.1f * copied);
 }
 
+// Where a detail is, the model does not look as its mirror image does, not even at its flat rim.
+TEST(ModelDetails, NothingIsCopiedBesideThem) {
+  constexpr int kNear = 3;  // px
+  RailSetting s;
+  const cv::Rect flag(s.rail.x, s.rail.y - 15, 40, 30);
+  const cv::Rect beside(flag.x - kNear, flag.y, kNear, flag.height);
+  s.key.bgr(beside).setTo(cv::Scalar(200, 30, 20), s.key.labels(beside) == kBallLabel);
+  s.key.labels(flag).setTo(kBallLabel), s.key.bgr(flag).setTo(kGreen);
+  s.depth(flag).setTo(s.depthOf(kCentre.cast<float>()));
+  const auto prepared = s.prepared(s.depth);
+  const Surface& surface = prepared->surfaces[0];
+  const SurfaceTexture& texture = prepared->appearances[0].texture;
+  const Eigen::Vector3f eye = s.key.camera.world_from_camera.translation().cast<float>();
+  int blue = 0, all = 0;
+  for (int t = 0; t < texture.triangleCount(); ++t) {
+    if (isDetail(surface, t)) continue;
+    for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
+      const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
+      Eigen::Vector3f at = Eigen::Vector3f::Zero();
+      for (int k = 0; k < 3; ++k) at += w[k] * surface.key_vertices[surface.triangles[t][k]];
+      const Eigen::Vector2d pixel = s.key.camera.projectWorld(at.cast<double>());
+      const Eigen::Vector3f normal = at - kCentre.cast<float>();
+      if (normal.dot(eye - at) < 0.0f || pixel.x() < flag.x - 1.5 ||
+          std::abs(pixel.y() - s.rail.y) > 10.0)
+        continue;
+      const cv::Vec4f& c = texture.texels[i];
+      ++all, blue += c[0] > 2.0f * c[2];
+    }
+  }
+  EXPECT_GT(all, 20);
+  EXPECT_GT(blue, 0.3 * all) << "the rest is seen too flatly";
+}
+
 TEST(ModelDetails, TheyTurnWithTheModel) {
   const RailSetting s;
   const auto prepared = s.prepared(s.depth);

@@ -79,6 +79,17 @@ cv::Mat trustOf(const cv::Mat& labels, int index, const cv::Rect& region) {
   return trust;
 }
 
+bool showsMark(const cv::Mat& marks, const cv::Point& corner, const Camera& camera,
+               const Place& place) {
+  if (marks.empty()) return false;
+  const Eigen::Vector3d to_eye =
+      camera.world_from_camera.translation() - place.point.cast<double>();
+  if (place.normal.cast<double>().dot(to_eye) < 0.0) return false;
+  const Eigen::Vector2d pixel = camera.projectWorld(place.point.cast<double>());
+  const cv::Point at = cv::Point(cvRound(pixel.x()), cvRound(pixel.y())) - corner;
+  return cv::Rect({0, 0}, marks.size()).contains(at) && marks.at<std::uint8_t>(at) != 0;
+}
+
 void trustDetails(const cv::Mat& labels, const Surface& surface, Reflectance& r) {
   if (surface.detailVertices() == 0) return;
   const cv::Mat depth = depthIn(labels, surface.index, r.region);
@@ -93,6 +104,19 @@ void trustDetails(const cv::Mat& labels, const Surface& surface, Reflectance& r)
       r.trust.at<float>(v, u) = rimTrust(d + lacks);
     }
   }
+}
+
+cv::Mat besideDetails(const Reflectance& picture, const Surface& surface) {
+  if (surface.detailVertices() == 0) return {};
+  cv::Mat details = cv::Mat::zeros(picture.triangle.size(), CV_8U);
+  for (int v = 0; v < details.rows; ++v) {
+    for (int u = 0; u < details.cols; ++u) {
+      const int triangle = picture.triangle.at<int>(v, u);
+      if (triangle >= 0 && isDetail(surface, triangle)) details.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  cv::dilate(details, details, cv::Mat::ones(2 * kThin + 1, 2 * kThin + 1, CV_8U));
+  return details;
 }
 
 void lowerBesideJumps(const Camera& camera, float tolerance, Reflectance& r) {

@@ -13,7 +13,9 @@
 #include "texture/colour_layers.hpp"
 #include "texture/like_places.hpp"
 #include "texture/like_texels.hpp"
+#include "texture/picture_trust.hpp"
 #include "texture/sightings.hpp"
+#include "texture/texel_budget.hpp"
 #include "texture/texture_miss.hpp"
 #include "texture/texture_patches.hpp"
 #include "texture/texture_seams.hpp"
@@ -22,10 +24,6 @@
 namespace calipso::render {
 namespace {
 
-// per object; where several frames make them, nothing else is drawn of what these show. Of pictures
-// of so many pixels, and of larger ones as many more, but no more than some times as many.
-constexpr std::size_t kMostTexels = 300000, kMostOfSeveral = 600000;
-constexpr double kUsualPixels = 640.0 * 360.0, kMostTimes = 4.0;
 // of the object's extent: a like place that far before the front is not on the object
 constexpr float kOffSurface = 0.03f;
 constexpr float kEnough = 0.3f;   // weight of a look that needs no other
@@ -41,12 +39,6 @@ constexpr float kLikeReach = 2.0f;      // spacings of texels
 constexpr std::size_t kMostTurned = 3;  // turned places that a place takes its look from
 // texels, about, by which like places are judged; of the stock model, where that takes longer
 constexpr std::size_t kCompared = 20000, kComparedOfStock = 5000;
-
-std::size_t mostTexels(const Camera& camera, std::size_t views) {
-  const double pictures = static_cast<double>(camera.width) * camera.height / kUsualPixels;
-  return static_cast<std::size_t>(std::clamp(pictures, 1.0, kMostTimes) *
-                                  static_cast<double>(views > 1 ? kMostOfSeveral : kMostTexels));
-}
 
 cv::Vec3f colourOf(const cv::Vec4f& c) { return {c[0], c[1], c[2]}; }
 
@@ -82,6 +74,7 @@ class TextureFill {
     Origins origins(a.texture.size());
     for (const Reflectance& r : pictures_) shown_.push_back(r.albedo);
     shown_[0] = a.albedo;
+    beside_details_ = besideDetails(pictures_[0], surface_);
     findLooks(a.texture);
     makeTexels(a.texture, origins);
     findLike(a.texture, origins);
@@ -323,36 +316,29 @@ class TextureFill {
 
   // Of what is at best seen at a flat angle: from texels that other frames than the key frame told.
   void copyLike(SurfaceTexture& texture, Origins& origins) const {
-    const auto forEach = [&](auto act) {
-      for (int t = 0; t < texture.triangleCount(); ++t) {
-        for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) act(t, i);
-      }
-    };
-    const auto placeAt = [&](int t, std::size_t i) {
-      return shapePlaceOf(t, texture.weightsOf(t, i - texture.firstOf(t)));
-    };
-    const auto isPoor = [&](std::size_t i) {
-      return origins.layer[i] < 0 || origins.layer[i] > static_cast<int>(like_.size());
-    };
+    if (like_.empty()) return;
     std::vector<KnownTexels::Texel> known;
-    std::vector<std::pair<int, std::size_t>> poor;
-    forEach([&](int t, std::size_t i) {
-      if (isPoor(i)) poor.push_back({t, i});
-    });
-    if (like_.empty() || poor.empty()) return;
-    forEach([&](int t, std::size_t i) {
-      const bool in_key = looks_[t].texels[i - texture.firstOf(t)].key >= kGood;
-      if (in_key || origins.layer[i] != 0 || origins.certain[i] < 1.0f) return;
-      Place place = placeAt(t, i);
-      place.part = sightings_.partOf(t);
-      known.push_back({place, colourOf(texture.texels[i])});
-    });
+    std::vector<std::pair<std::size_t, Place>> poor;
+    for (int t = 0; t < texture.triangleCount(); ++t) {
+      for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
+        const int layer = origins.layer[i];
+        const bool is_poor = layer < 0 || layer > static_cast<int>(like_.size()),
+                   in_key = looks_[t].texels[i - texture.firstOf(t)].key >= kGood,
+                   is_known = layer == 0 && !in_key && origins.certain[i] >= 1.0f;
+        if (!is_poor && !is_known) continue;
+        const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
+        Place place = shapePlaceOf(t, w);
+        if (is_poor && !lacksLike(t, w)) poor.push_back({i, place});
+        if (!is_known) continue;
+        place.part = sightings_.partOf(t);
+        known.push_back({place, colourOf(texture.texels[i])});
+      }
+    }
     if (known.empty()) return;
     const KnownTexels texels(std::move(known), kLikeReach * texture.spacing());
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::size_t k = 0; k < poor.size(); ++k) {
-      const auto& [t, i] = poor[k];
-      const Place place = placeAt(t, i);
+      const auto& [i, place] = poor[k];
       for (std::size_t j = 0; j < like_.size(); ++j) {
         const auto colour = texels.at(like_[j].of(place));
         if (!colour) continue;
@@ -375,7 +361,7 @@ class TextureFill {
     };
     for (const LikePlace& like : like_) {
       if (layers.open == 0.0f) return;
-      if (isDetail(surface_, triangle)) break;
+      if (lacksLike(triangle, w)) break;
       const Sighting l = lookAtShape(like.of(place));
       const float good = smoothStep(kPoor, kGood, l.weight);
       add(l, good > 0.0f ? good * sightings_.asOpen(0, l, place) : 0.0f);
@@ -384,6 +370,12 @@ class TextureFill {
     layers.add(own, flat * flat);
     const Sighting front = sightings_.frontBefore(keyPlaceOf(triangle, w));
     add(front, smoothStep(0.0f, kGood, front.weight));
+  }
+
+  // A detail, and what is beside one: the place's mirror image has none.
+  bool lacksLike(int triangle, const Eigen::Vector3f& w) const {
+    return isDetail(surface_, triangle) || showsMark(beside_details_, pictures_[0].region.tl(),
+                                                     views_[0]->camera, keyPlaceOf(triangle, w));
   }
 
   const std::vector<const View*>& views_;
@@ -395,6 +387,7 @@ class TextureFill {
   Points stock_normals_;
   std::optional<BentShape> bent_;
   std::vector<Looks> looks_;     // per triangle
+  cv::Mat beside_details_;       // besideDetails() of the key frame's picture
   std::vector<LikePlace> like_;  // best first; none before findLike()
   std::vector<cv::Mat>
       shown_;  // per picture, CV_32FC4: the reflectance that the texture is made of
