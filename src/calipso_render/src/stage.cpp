@@ -157,9 +157,9 @@ Surface makeSurface(const ObjectModel& model) {
 namespace {
 
 // What the surface sees, turned with their object and then as their normals are beside it.
-void turnSeen(const Surface& surface, Actor& actor) {
-  const Eigen::Matrix3f turn = turnBetween(surface.key_vertices, actor.vertices);
-  actor.seen = surface.seen, actor.seen_behind = surface.seen_behind;
+// @param turn of the object
+void turnSeen(const Surface& surface, const Eigen::Matrix3f& turn, Actor& actor) {
+  actor.seen.resize(surface.seen.size()), actor.seen_behind.resize(surface.seen_behind.size());
   constexpr float kSame = 0.9998f;  // cosine: about a degree
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < actor.seen.size(); ++i) {
@@ -167,8 +167,8 @@ void turnSeen(const Surface& surface, Actor& actor) {
     Eigen::Matrix3f by = turn;
     if (n.dot(actor.normals[i]) < kSame)
       by = Eigen::Quaternionf::FromTwoVectors(n, actor.normals[i]).toRotationMatrix() * turn;
-    actor.seen[i] = actor.seen[i].turned(by);
-    if (!actor.seen_behind.empty()) actor.seen_behind[i] = actor.seen_behind[i].turned(by);
+    actor.seen[i] = surface.seen[i].turned(by);
+    if (!actor.seen_behind.empty()) actor.seen_behind[i] = surface.seen_behind[i].turned(by);
   }
 }
 
@@ -178,14 +178,18 @@ Actor makeActor(const Surface& surface, Points vertices, const Camera& camera) {
   Actor actor;
   actor.surface = &surface;
   actor.vertices = std::move(vertices);
+  const bool fits = actor.vertices.size() == surface.key_vertices.size();
+  Eigen::Matrix3f turn;
   sideBySide(
       true,
       [&] {
-        if (actor.vertices.size() != surface.key_vertices.size()) return;
-        actor.normals = surfaceNormals(surface, actor.vertices);
-        turnSeen(surface, actor);
+        if (fits) actor.normals = surfaceNormals(surface, actor.vertices);
       },
-      [&] { actor.screen = projectMesh(actor.vertices, surface.triangles, camera); });
+      [&] {
+        actor.screen = projectMesh(actor.vertices, surface.triangles, camera);
+        if (fits) turn = turnBetween(surface.key_vertices, actor.vertices);
+      });
+  if (fits) turnSeen(surface, turn, actor);
   const auto behind = [](const Eigen::Vector3f& p) { return std::isnan(p.z()); };
   const bool around_us =
       std::any_of(actor.screen.points.begin(), actor.screen.points.end(), behind);
