@@ -83,7 +83,7 @@ def main():
     with open(path) as file:
         results = [json.loads(line) for line in file]
     with open(os.path.join(output, "contact.md"), "w") as report:
-        print("# Contact\n\nProcess CPU time, all threads together.\n\n## Cases\n", file=report)
+        print("# Contact\n\nProcess CPU time, all threads together; rows of wall time are so named.\n\n## Cases\n", file=report)
         print("\n".join(rows(results)), file=report)
         print("\n## Error against time: soft cubes of 512 nodes fall on a plane and on each other, the first second\n", file=report)
         print("\n".join(error_against_time(results)), file=report)
