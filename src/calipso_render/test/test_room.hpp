@@ -9,9 +9,11 @@
 namespace calipso::render::testing {
 
 constexpr int kWide = 160, kHigh = 120;
-constexpr float kWallAway = 3.0f;        // m, along y
+constexpr float kWallAway = 3.0f;  // m, along y
 const cv::Rect kObject(60, 40, 40, 60);  // across the edge between floor and wall
 constexpr float kObjectAway = 2.0f;
+// Towards it, world.
+inline const Eigen::Vector3f kSun = Eigen::Vector3f(-0.3f, -0.6f, 0.7f).normalized();
 
 // 1 m over the floor z = 0, looking along y.
 inline Camera roomCamera() {
