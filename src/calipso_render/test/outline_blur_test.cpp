@@ -112,6 +112,12 @@ cv::Mat labelsOf(const FrameInput& input, const Prepared& prepared) {
   return labels;
 }
 
+std::shared_ptr<const Prepared> learntFrom(const ClipFrame& key) {
+  ClipSample clip;
+  clip.add(key);
+  return std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre)}, params()));
+}
+
 cv::Mat drawnBy(Renderer& renderer, const FrameInput& input) {
   cv::Mat codes;
   renderer.composite(input).bgr.convertTo(codes, CV_32F);
@@ -121,14 +127,11 @@ cv::Mat drawnBy(Renderer& renderer, const FrameInput& input) {
 // A ball that is moved in a blurred picture has an outline as soft as before; one that stays is the
 // picture's, to the byte.
 TEST(Renderer, DrawnOutlinesAreAsSoftAsTheVideos) {
-  const ObjectModel ball = ballAt(kCentre);
-  ClipFrame key = frameWithBall(ball);
+  ClipFrame key = frameWithBall(ballAt(kCentre));
   cv::Mat linear = linearFromCode(key.bgr);
   cv::GaussianBlur(linear, linear, {0, 0}, 1.0);
   key.bgr = codeFromLinear(linear);
-  ClipSample clip;
-  clip.add(key);
-  const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ball}, params()));
+  const auto prepared = learntFrom(key);
   ASSERT_NEAR(prepared->outline_blur, 1.0f, 0.2f);
   auto sharp = std::make_shared<Prepared>(*prepared);
   sharp->outline_blur = 0.0f;
@@ -149,17 +152,14 @@ TEST(Renderer, DrawnOutlinesAreAsSoftAsTheVideos) {
 }
 
 TEST(Renderer, DrawnColoursAreAsSoftAsTheVideos) {
-  const ObjectModel ball = ballAt(kCentre);
-  ClipFrame key = frameWithBall(ball);
+  ClipFrame key = frameWithBall(ballAt(kCentre));
   cv::Mat codes;
   key.bgr.convertTo(codes, CV_32F);
   for (int v = 0; v < kHeight; ++v)
     for (int u = 0; u < kWidth; ++u)
       if (key.labels.at<std::uint8_t>(v, u) != 0) codes.at<cv::Vec3f>(v, u)[0] *= 0.5f;
   withSoftColours(codes, 1.3f).convertTo(key.bgr, CV_8U);
-  ClipSample clip;
-  clip.add(key);
-  const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ball}, params()));
+  const auto prepared = learntFrom(key);
   ASSERT_NEAR(prepared->colour_blur, 1.3f, 0.3f);
   auto crisp = std::make_shared<Prepared>(*prepared);
   crisp->colour_blur = 0.0f;

@@ -279,8 +279,8 @@ class Squares {
   }
 
   // Every pixel on its own: the relief, or several planes. Those at a shadow's border have the mean
-  // of what their corners see, as on planes; where a surface ends, too, that of all around. What sees
-  // neither keeps its value.
+  // of what their corners see, as on planes; where a surface ends, too, that of all around. What
+  // sees neither keeps its value.
   void fillExactly(const cv::Rect& square, const cv::Rect& here) const {
     const cv::Rect own = here + rect_.tl() - square.tl();  // of the square's pixels
     Exact exact;

@@ -188,6 +188,7 @@ void soften(const Outlines& outlines, const cv::Rect& region, float blur, FrameO
 
 void softenOutlines(const StagedFrame& frame, const DrawnSurfaces& surfaces, FrameOutput& out) {
   const float blur = frame.prepared.outline_blur, colour = frame.prepared.colour_blur;
+  if (std::max(blur, colour) < kLeast) return;
   const Outlines outlines = findOutlines(frame, surfaces);
   const cv::Rect region = surfaces.centre().region();
   soften<Lens>(outlines, region, blur, out);
