@@ -116,6 +116,38 @@ TEST(BridgeLines, DrawALineAloneThatPassesBeforeOtherThings) {
   }
 }
 
+// The joint of a pavement: the slabs on either side of it differ, and others lie at its other end.
+TEST(BridgeLines, DrawAJointBetweenThingsThatDiffer) {
+  Lines l;
+  for (int v = 0; v < 200; ++v) {
+    for (int u = 0; u < 320; ++u) {
+      const bool below = v > 80 + 20 * u / 319, right = u > 160;
+      const float slab = below ? (right ? 40.0f : -20.0f) : (right ? -30.0f : 60.0f);
+      l.image.at<cv::Vec3f>(v, u) += cv::Vec3f::all(slab);
+    }
+  }
+  l.line({0, 80}, {319, 100});
+  const LineBridges b = l.bridge();
+  for (int u = 112; u < 208; ++u) {
+    const int v = cvRound(80.0 + 20.0 * u / 319.0);
+    ASSERT_NE(b.before.at<std::uint8_t>(v, u), 0) << u;
+    EXPECT_LT(l.image.at<cv::Vec3f>(v, u)[1], 80.0f) << u;
+    EXPECT_EQ(b.drawn.at<std::uint8_t>(v - 3, u) | b.drawn.at<std::uint8_t>(v + 3, u), 0) << u;
+  }
+}
+
+// A post of which nothing is known stands where the line is lost.
+TEST(BridgeLines, ConnectALineThatIsHiddenBeforeItReachesTheHole) {
+  Lines l;
+  l.line({0, 80}, {319, 115});
+  l.hole(cv::Rect(110, 50, 100, 100)).setTo(255);
+  cv::Mat source = l.hole == 0;
+  source.colRange(70, 112).setTo(0);
+  const LineBridges b =
+      bridgeLines(straightEdges(source, l.image), l.hole, source, cv::Mat(), l.image);
+  EXPECT_NE(b.core.at<std::uint8_t>(96, 150), 0);
+}
+
 TEST(BridgeLines, LeadALineToTheOneThatItMeets) {
   Lines l;
   l.line({0, 90}, {319, 90});

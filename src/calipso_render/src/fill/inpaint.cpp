@@ -106,8 +106,9 @@ Filling fill(const std::vector<cv::Vec4f>& edges, cv::Mat look, cv::Mat to_fill,
   const cv::Mat lone = !pattern.lattice ? loneLines(edges, source, look) : cv::Mat();
   const LineBridges bridges = bridgeLines(edges, to_fill, source, params.surface, look,
                                           pattern.lattice ? &*pattern.lattice : nullptr);
-  to_fill.setTo(0, bridges.core);
-  known |= bridges.core;
+  const cv::Mat lines = look.clone(), guide = bridges.core & ~bridges.before;
+  to_fill.setTo(0, guide);
+  known |= guide;
   source.setTo(0, bridges.lines);
   if (!lone.empty()) leaveOut(lone, source);
   if (!params.sky.empty()) params.sky = hiddenSky(copiedSky(params.sky, bridges.origin));
@@ -118,6 +119,7 @@ Filling fill(const std::vector<cv::Vec4f>& edges, cv::Mat look, cv::Mat to_fill,
   if (cv::countNonZero(without) < cv::countNonZero(to_fill))
     blendSeams(to_fill, known, f.origin, planesOf(params), params.sky, f.image);
   bridges.origin.copyTo(f.origin, bridges.core);
+  lines.copyTo(f.image, bridges.before);
   f.origin.setTo(cv::Scalar(-1, -1), whole_hole == 0);
   return f;
 }

@@ -10,6 +10,7 @@
 
 #include "fill/line_band.hpp"
 #include "fill/line_ends.hpp"
+#include "fill/line_match.hpp"
 #include "fill/line_to_border.hpp"
 #include "fill/surface_border.hpp"
 
@@ -18,20 +19,17 @@ namespace {
 
 // code values across a thin line that ends at another one
 constexpr float kAloneContrast = 30.0f;
-constexpr float kAsStrong = 0.5f;     // part of its contrast that the other one has at least
-constexpr float kStray = 1.5f;        // px by which ends may miss each other,
-constexpr float kTurn = 0.04f;        // and part of the way between them
-constexpr float kAlike = 0.4f;        // difference of colours across, to their contrast
-constexpr float kBesideAlike = 0.5f;  // the same of what is beside it
-constexpr float kInHole = 0.7f;       // part of a connection that the hole hides
-constexpr float kSeenPart = 0.1f;     // of it, that is seen of either line at least,
-constexpr float kSeenAmid = 0.15f;    // and amid others, as blades of grass are
-constexpr float kBesideLine = 3.0f;   // px by which its pieces may miss it
-constexpr float kAmid = 25.0f;        // px around a line's end,
-constexpr int kOthers = 3;            // and how many others end there
-constexpr float kLongest = 40.0f;     // px of a line that are mirrored
-constexpr float kCore = 1.5f;         // px on either side that are the line itself
-constexpr float kAlone = 1.0f;        // the same of one that passes before different things
+constexpr float kAsStrong = 0.5f;    // part of its contrast that the other one has at least
+constexpr float kAlike = 0.4f;       // difference of colours across, to their contrast
+constexpr float kHidden = 0.7f;      // part of a connection that is not seen
+constexpr float kSeenPart = 0.1f;    // of it, that is seen of either line at least,
+constexpr float kSeenAmid = 0.15f;   // and amid others, as blades of grass are
+constexpr float kBesideLine = 3.0f;  // px by which its pieces may miss it
+constexpr float kAmid = 25.0f;       // px around a line's end,
+constexpr int kOthers = 3;           // and how many others end there
+constexpr float kLongest = 40.0f;    // px of a line that are mirrored
+constexpr float kCore = 1.5f;        // px on either side that are the line itself
+constexpr float kAlone = 1.0f;       // the same of one that passes before different things
 constexpr LineBand kOwn{kLineHalf, kLineHalf};  // of a line by itself
 constexpr float kCrossFade = 4.0f;              // px on either side of the middle
 constexpr int kBesideEnd = 3;  // px by which a border's end may have been found beside it
@@ -40,6 +38,8 @@ struct Bridge {
   const LineEnd *from, *to;  // to: nothing if it ends at another bridge
   float gap, cost;
   LineBand band;
+
+  bool isAlone() const { return band.left == kAlone; }
 };
 
 class Bridger {
@@ -48,6 +48,7 @@ class Bridger {
       : hole_(hole), source_(source), surface_(surface), image_(image) {
     result_.drawn = cv::Mat::zeros(hole.size(), CV_8U);
     result_.core = cv::Mat::zeros(hole.size(), CV_8U);
+    result_.before = cv::Mat::zeros(hole.size(), CV_8U);
     result_.lines = cv::Mat::zeros(hole.size(), CV_8U);
     result_.origin = cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
   }
@@ -61,14 +62,16 @@ class Bridger {
                       [&](const LineEnd& end) { return repeats(end, *lattice, source_, image_); }),
                   ends_.end());
     }
-    std::vector<Bridge> bridges = connections(&Bridger::connection);
+    const std::vector<LineEnd> joints = jointsOf(ends_, hole_, source_, image_);
+    std::vector<Bridge> bridges = connections(joints, &Bridger::connection);
     for (Bridge& b : bridges) {
-      if (b.band.left > kAlone) b.band = bandAlong(*b.from, *b.to, source_, image_);
+      if (!b.isAlone()) b.band = bandAlong(*b.from, *b.to, source_, image_);
     }
     const std::size_t through = bridges.size();
     for (const LineEnd& end : ends_) {
-      if (std::any_of(bridges.begin(), bridges.begin() + through,
-                      [&](const Bridge& b) { return b.from == &end || b.to == &end; }))
+      if (std::any_of(bridges.begin(), bridges.begin() + through, [&](const Bridge& b) {
+            return b.from->line == end.line || b.to->line == end.line;
+          }))
         continue;
       if (const auto gap = goesOn(end, bridges, through))
         bridges.push_back({&end, nullptr, *gap, 0.0f, kOwn});
@@ -82,7 +85,7 @@ class Bridger {
   LineBridges runBorders(const std::vector<cv::Vec4f>& edges, cv::Mat& surface) {
     ends_ = withBeside(findLineEnds(edges, hole_, source_, image_, false), kBesideEnd, hole_,
                        source_, image_);
-    std::vector<Bridge> borders = connections(&Bridger::border);
+    std::vector<Bridge> borders = connections({}, &Bridger::border);
     sortByStrength(borders);
     drawAll(borders);
     for (const Bridge& b : borders) {
@@ -122,11 +125,11 @@ class Bridger {
   // @return nothing if b does not continue a
   std::optional<Bridge> connection(const LineEnd& a, const LineEnd& b, float gap) const {
     if (!areInLine(a, b, gap) || isByChance(a, b, gap)) return std::nullopt;
-    if (besideAlike(a, b)) {
+    if (!a.is_joint && !b.is_joint && besideAlike(a, b)) {
       if (const auto cost = misfit(a, b, gap, differenceAcross(a, b)))
         return Bridge{&a, &b, gap, *cost, kOwn};
     }
-    if (!a.isThin() || !b.isThin()) return std::nullopt;
+    if ((!a.isThin() && !a.is_joint) || (!b.isThin() && !b.is_joint)) return std::nullopt;
     const auto alone = misfit(a, b, gap, differenceAlone(a, b));
     return alone ? std::optional<Bridge>({&a, &b, gap, 1.0f + *alone, {kAlone, kAlone}})
                  : std::nullopt;
@@ -142,16 +145,21 @@ class Bridger {
   }
 
   // Ends that continue each other, the best first, each once, none across another.
+  // @param joints more of them; what is returned points into it
   // @param connect connection() or border()
-  std::vector<Bridge> connections(std::optional<Bridge> (Bridger::*connect)(const LineEnd&,
+  std::vector<Bridge> connections(const std::vector<LineEnd>& joints,
+                                  std::optional<Bridge> (Bridger::*connect)(const LineEnd&,
                                                                             const LineEnd&, float)
                                       const) const {
-    std::vector<std::vector<Bridge>> from(ends_.size());
+    std::vector<const LineEnd*> ends;
+    for (const LineEnd& end : ends_) ends.push_back(&end);
+    for (const LineEnd& joint : joints) ends.push_back(&joint);
+    std::vector<std::vector<Bridge>> from(ends.size());
 #pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t i = 0; i < ends_.size(); ++i) {
-      for (std::size_t j = i + 1; j < ends_.size(); ++j) {
-        const float gap = static_cast<float>(cv::norm(ends_[j].at - ends_[i].at));
-        if (const auto bridge = (this->*connect)(ends_[i], ends_[j], gap))
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      for (std::size_t j = i + 1; j < ends.size(); ++j) {
+        const float gap = static_cast<float>(cv::norm(ends[j]->at - ends[i]->at));
+        if (const auto bridge = (this->*connect)(*ends[i], *ends[j], gap))
           from[i].push_back(*bridge);
       }
     }
@@ -182,59 +190,11 @@ class Bridger {
     return side(p, q, r) != side(p, q, s) && side(r, s, p) != side(r, s, q);
   }
 
-  // Of what lines and what is beside them look like, to their contrast.
-  static float differenceAcross(const LineEnd& a, const LineEnd& b) {
-    float sum = 0.0f;
-    for (int s = 0; s <= 2 * kLineHalf; ++s)
-      sum += static_cast<float>(
-                 cv::norm(a.profile[s] - b.profile[2 * kLineHalf - s], cv::NORM_L2SQR)) /
-             3.0f;
-    return std::sqrt(sum / (2 * kLineHalf + 1)) / std::min(a.contrast, b.contrast);
-  }
-
-  // Of the lines themselves, wherever in a pixel they lie.
-  static float differenceAlone(const LineEnd& a, const LineEnd& b) {
-    cv::Vec3f sum;
-    for (int s = -1; s <= 1; ++s) sum += a.profile[kLineHalf + s] - b.profile[kLineHalf - s];
-    return rms(sum / 3.0f) / std::max(a.contrast, b.contrast);
-  }
-
-  // That of the line and what is on one side of it, the side that differs less.
-  static float differenceOfSides(const LineEnd& a, const LineEnd& b) {
-    float least = 1e9f;
-    for (const int first : {0, kLineHalf}) {
-      float sum = 0.0f;
-      for (int s = first; s <= first + kLineHalf; ++s)
-        sum += static_cast<float>(
-                   cv::norm(a.profile[s] - b.profile[2 * kLineHalf - s], cv::NORM_L2SQR)) /
-               3.0f;
-      least = std::min(least, std::sqrt(sum / (kLineHalf + 1)));
-    }
-    return least / std::min(a.contrast, b.contrast);
-  }
-
-  static bool besideAlike(const LineEnd& a, const LineEnd& b) {
-    const float most = kBesideAlike * std::min(a.contrast, b.contrast);
-    return rms(a.beside[0] - b.beside[1]) <= most && rms(a.beside[1] - b.beside[0]) <= most;
-  }
-
-  static float strayOf(const LineEnd& a, const LineEnd& b) {
-    const cv::Point2f way = b.at - a.at;
-    return std::max(std::abs(render::cross(a.into, way)), std::abs(render::cross(b.into, way)));
-  }
-  static float allowedStray(float gap) { return kStray + kTurn * gap; }
-
-  static bool areInLine(const LineEnd& a, const LineEnd& b, float gap) {
-    const cv::Point2f way = b.at - a.at;
-    return gap >= 2.0f && a.into.dot(way) >= 0.9f * gap && b.into.dot(way) <= -0.9f * gap &&
-           strayOf(a, b) <= allowedStray(gap);
-  }
-
   // Among many short lines some are in line with others far away.
   bool isByChance(const LineEnd& a, const LineEnd& b, float gap) const {
     const auto amid = [&](const LineEnd& end) {
       return std::count_if(ends_.begin(), ends_.end(), [&](const LineEnd& other) {
-               return &other != &end && cv::norm(other.at - end.at) < kAmid;
+               return other.line != end.line && cv::norm(other.at - end.at) < kAmid;
              }) >= kOthers;
     };
     const auto is_short = [&](const LineEnd& end) {
@@ -252,7 +212,9 @@ class Bridger {
       const auto aside = [&](const cv::Point2f& p) {
         return std::abs(render::cross(end.into, p - end.at));
       };
-      const auto behind = [&](const cv::Point2f& p) { return end.into.dot(p - end.at) < kStray; };
+      const auto behind = [&](const cv::Point2f& p) {
+        return end.into.dot(p - end.at) < kLineStray;
+      };
       if (aside(a) <= kBesideLine && aside(b) <= kBesideLine && behind(a) && behind(b))
         sum += 0.5f * std::abs(end.into.dot(b - a));  // each has two sides
     }
@@ -263,7 +225,7 @@ class Bridger {
   // @param difference of their colours, to their contrast
   std::optional<float> misfit(const LineEnd& a, const LineEnd& b, float gap,
                               float difference) const {
-    if (difference > kAlike || hiddenPart(a.at, b.at) < kInHole) return std::nullopt;
+    if (difference > kAlike || hiddenPart(a.at, b.at) < kHidden) return std::nullopt;
     return strayOf(a, b) / allowedStray(gap) + difference / kAlike +
            gap / std::max(hole_.cols, hole_.rows);
   }
@@ -272,7 +234,7 @@ class Bridger {
     const int steps = std::max(2, cvRound(cv::norm(b - a)));
     int hidden = 0;
     for (int i = 0; i <= steps; ++i)
-      hidden += isSet(hole_, a + (static_cast<float>(i) / steps) * (b - a));
+      hidden += !isSet(source_, a + (static_cast<float>(i) / steps) * (b - a));
     return static_cast<float>(hidden) / (steps + 1);
   }
 
@@ -299,7 +261,7 @@ class Bridger {
                   where = render::cross(start - end.at, end.into) / sine;
       if (t > 2.0f && where >= 0.0f && where <= 1.0f && (!nearest || t < *nearest)) nearest = t;
     }
-    if (nearest && (hiddenPart(end.at, end.at + *nearest * end.into) < kInHole ||
+    if (nearest && (hiddenPart(end.at, end.at + *nearest * end.into) < kHidden ||
                     !staysOnSurface(end, *nearest)))
       return std::nullopt;
     return nearest;
@@ -372,6 +334,7 @@ class Bridger {
     image_.at<cv::Vec3f>(at) = colour;
     result_.drawn.at<std::uint8_t>(at) = 255;
     result_.core.at<std::uint8_t>(at) = 255;
+    result_.before.at<std::uint8_t>(at) = b.isAlone() ? 255 : 0;
     result_.origin.at<cv::Vec2s>(at) =
         cv::Vec2s(cv::saturate_cast<short>(origin.x), cv::saturate_cast<short>(origin.y));
   }

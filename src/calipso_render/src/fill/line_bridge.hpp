@@ -12,6 +12,8 @@ struct LineBridges {
   // CV_8UC1: the part of it that is the line; what is beside it is better filled like everything
   // else
   cv::Mat core;
+  // CV_8UC1: of core, what passes before things that are not alike: no part of what is behind it
+  cv::Mat before;
   cv::Mat origin;  // CV_16SC2: where it was copied from; (-1, -1) elsewhere
   // CV_8UC1: 255 where those lines are seen; now that they are whole, nothing else should look like
   // them

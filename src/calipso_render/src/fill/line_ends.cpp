@@ -79,12 +79,24 @@ class LineEndFinder {
     return 2 * found > pieces ? sum / static_cast<float>(found) : 0.0f;
   }
 
+  // An edge of a line between two things, in its middle; nothing if there is none.
+  std::optional<LineEnd> joint(LineEnd end) const {
+    end.is_joint = true;
+    return partsThings(end) && centre(end) && partsThings(end) ? std::optional<LineEnd>(end)
+                                                               : std::nullopt;
+  }
+
   std::optional<LineEnd> moved(LineEnd end, float aside) const {
     end.at += aside * leftOf(end.into);
     return isSet(source_, end.at) && measure(end) ? std::optional<LineEnd>(end) : std::nullopt;
   }
 
  private:
+  // Either side differs from the mean of both by less than the line does.
+  static bool partsThings(const LineEnd& end) {
+    return !end.isThin() && 0.5f * rms(end.beside[0] - end.beside[1]) < kLineItself * end.contrast;
+  }
+
   // Both edges of a line were found and are now the same: the longer one stays, seen near the hole
   // if one is.
   void dropDoubles() {
@@ -117,8 +129,7 @@ class LineEndFinder {
     if (length < kShortest || !cv::Rect({0, 0}, hole_.size()).contains(before) ||
         away.at<float>(before) < kClear)
       return std::nullopt;
-    float reach = 1.0f;
-    while (reach <= kFarthest && !isSet(hole_, to + reach * into)) reach += 1.0f;
+    float reach = toHole(to, into);
     // Where the hole runs beside it the line is measured farther back.
     for (const float nearest = std::min(reach, kLost); reach <= kFarthest && length >= kShortest;
          reach += kStepBack, length -= kStepBack, to -= kStepBack * into) {
@@ -128,10 +139,24 @@ class LineEndFinder {
     return std::nullopt;
   }
 
+  // px to the hole; if it is too far, those that are seen on a way most of which is not; else more
+  // than kFarthest.
+  float toHole(const cv::Point2f& from, const cv::Point2f& into) const {
+    const cv::Rect all({0, 0}, hole_.size());
+    float seen = 1.0f;
+    for (float t = 1.0f; t <= kFarthest || 2.0f * seen < std::min(t, kFarthest); t += 1.0f) {
+      const cv::Point2f p = from + t * into;
+      if (!all.contains(cv::Point(cvRound(p.x), cvRound(p.y)))) break;
+      if (isSet(hole_, p)) return t <= kFarthest ? t : seen;
+      if (isSet(source_, p)) seen += 1.0f;
+    }
+    return kFarthest + 1.0f;
+  }
+
   // An edge of a thin line goes to the line's middle, and along it: through its middles near the
   // end and far from it.
   bool centre(LineEnd& end) const {
-    for (int i = 0; i < kCentrings && end.isThin(); ++i) {
+    for (int i = 0; i < kCentrings && (end.is_joint || end.isThin()); ++i) {
       const auto near = middleAt(end, kFirst, kLast),
                  far = middleAt(end, static_cast<int>(end.length) - kLast,
                                 static_cast<int>(end.length) - kFirst);
@@ -249,6 +274,16 @@ std::vector<cv::Vec4f> straightEdges(const cv::Mat& source, const cv::Mat& image
 std::vector<LineEnd> findLineEnds(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole,
                                   const cv::Mat& source, const cv::Mat& image, bool only_clear) {
   return LineEndFinder(hole, source, image, only_clear).run(edges);
+}
+
+std::vector<LineEnd> jointsOf(const std::vector<LineEnd>& ends, const cv::Mat& hole,
+                              const cv::Mat& source, const cv::Mat& image) {
+  const LineEndFinder finder(hole, source, image);
+  std::vector<LineEnd> joints;
+  for (const LineEnd& end : ends) {
+    if (const auto joint = finder.joint(end)) joints.push_back(*joint);
+  }
+  return joints;
 }
 
 std::vector<LineEnd> withBeside(const std::vector<LineEnd>& ends, int reach, const cv::Mat& hole,

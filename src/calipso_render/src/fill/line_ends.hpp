@@ -21,6 +21,7 @@ struct LineEnd {
   std::array<cv::Vec3f, 2> beside;  // mean colours left and right of it
   bool from_afar;                   // nearer to the hole it was not to be measured
   int line = 0;                     // number of the edge that it is an end of
+  bool is_joint = false;            // in the middle of a line between two things: see jointsOf()
 
   bool isThin() const;  // a line, not an edge between two things
 };
@@ -35,6 +36,11 @@ std::vector<cv::Vec4f> straightEdges(const cv::Mat& source, const cv::Mat& image
 std::vector<LineEnd> findLineEnds(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole,
                                   const cv::Mat& source, const cv::Mat& image,
                                   bool only_clear = true);
+
+// Those of them that are edges of a line between two things, as joints between slabs of two colours
+// are, moved into its middle.
+std::vector<LineEnd> jointsOf(const std::vector<LineEnd>& ends, const cv::Mat& hole,
+                              const cv::Mat& source, const cv::Mat& image);
 
 // The same ends, and each up to so many pixels to either side: of two edges that lie close together
 // one may have been found here and the other one there.
