@@ -64,6 +64,26 @@ TEST(FitGloss, ReadsAClippedHighlightByItsFlanks) {
   }
 }
 
+// A highlight no wider than pixels and normals make it: how smooth the surface is below that is not
+// told, and the smoothest that is tried (0.03) is no better a guess than the others.
+TEST(FitGloss, TakesTheMiddleOfWhatANarrowHighlightLeaves) {
+  LightFit fit = plainFit(Light());
+  fit.light.direction = Eigen::Vector3f(0.4f, -0.6f, 0.7f).normalized();
+  int clipped = 0;
+  std::vector<HighlightSample> highlights = clippedHighlight(fit.light, 0.19f, clipped);
+  cv::RNG random(7);
+  for (HighlightSample& h : highlights) {
+    h.spread = 0.135f;  // with the normals' error it makes a lobe of 0.193
+    h.at.radiance *= 1.0f + static_cast<float>(random.gaussian(0.25));
+  }
+  const std::optional<SeenGloss> found = fitGloss(highlights, fit, {});
+  ASSERT_TRUE(found);
+  EXPECT_GT(found->gloss.roughness, 0.035f);
+  EXPECT_LT(found->gloss.roughness, 0.09f);
+  EXPECT_GT(found->roughest, 0.09f);
+  EXPECT_NEAR(found->gloss.specular, 0.05f, 0.005f);
+}
+
 // Three objects: two of one gloss, and one of another.
 TEST(SeenGlosses, HoldEachObjectsOwnWhereItDiffers) {
   LightFit fit = plainFit(Light());

@@ -25,6 +25,8 @@ constexpr double kNarrowPart = 0.5;  // of its roughness, that a narrow one besi
 constexpr double kSeenBeside = 15.0;
 // rows' mean errors within which another roughness explains the highlights as well
 constexpr double kAlike = 6.0;
+// ... and hardly any worse: what pixels and normals blur is seldom smoother than all that is tried
+constexpr double kSame = 1.0;
 // Directions beside the light's, and how far (rad), that highlights have to speak against; by so
 // many samples, and every so manieth roughness.
 constexpr int kBesides = 8, kTriedStep = 3;
@@ -220,12 +222,19 @@ std::optional<Found> bestRoughness(const std::vector<Row>& rows,
   }
   const std::size_t best = std::min_element(costs.begin(), costs.end()) - costs.begin();
   if (costs.empty() || costs[best] >= most) return std::nullopt;
-  const double alike = costs[best] * (1.0 + kAlike / weightOf(rows));
-  std::size_t first = best, last = best;
-  while (first > 0 && costs[first - 1] <= alike) --first;
-  while (last + 1 < costs.size() && costs[last + 1] <= alike) ++last;
+  const auto limitOf = [&](double errors) { return costs[best] * (1.0 + errors / weightOf(rows)); };
+  const auto lastWithin = [&](double cost) {
+    std::size_t last = best;
+    while (last + 1 < costs.size() && costs[last + 1] <= cost) ++last;
+    return last;
+  };
+  std::size_t first = best;
+  while (first > 0 && costs[first - 1] <= limitOf(kAlike)) --first;
+  const std::size_t last = lastWithin(limitOf(kAlike));
   double exact = static_cast<double>(best);
-  if (best > 0 && best + 1 < costs.size())
+  if (best == 0)
+    exact = 0.5 * static_cast<double>(lastWithin(limitOf(kSame)));
+  else if (best + 1 < costs.size())
     exact += leastOf(costs[best - 1], costs[best], costs[best + 1]);
   const float ks = static_cast<float>(at(exact).strength);
   Found found;
