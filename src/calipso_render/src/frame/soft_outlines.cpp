@@ -89,11 +89,14 @@ struct Codec {
 };
 
 // How much of its softness an outline lacks: none where the surface is where the video has it, as
-// what drawing misses of the video is carried over there.
+// what drawing misses of the video is carried over there. Nothing is carried from where the video
+// has another part of a surface that moves.
 float lacksSoftness(const StagedFrame& frame, std::uint32_t id, int u, int v) {
   if (!frame.objectOf(id).isAtRestInVideo()) return 1.0f;
-  const float moved = frame.movement(id, static_cast<float>(u), static_cast<float>(v)).norm();
-  return smoothStep(kStillPx, kNonePx, moved);
+  const Eigen::Vector2f moved = frame.movement(id, static_cast<float>(u), static_cast<float>(v));
+  const cv::Point from(cvRound(u - moved.x()), cvRound(v - moved.y()));
+  if (frame.whole().contains(from) && frame.isElsewhere(from.x, from.y)) return 1.0f;
+  return smoothStep(kStillPx, kNonePx, moved.norm());
 }
 
 // A pixel of an outline, and how much of its softness it lacks.
