@@ -32,6 +32,18 @@ cv::Mat mixedPatches(const cv::Mat& surface) {
 
 }  // namespace
 
+std::vector<int> knownAround(const cv::Point& p, const cv::Mat& known, const cv::Mat& image) {
+  const int row = static_cast<int>(image.step1());
+  std::vector<int> seen;
+  for (int dv = -kPatchRadius; dv <= kPatchRadius; ++dv) {
+    for (int du = -kPatchRadius; du <= kPatchRadius; ++du) {
+      if (known.at<std::uint8_t>(p + cv::Point(du, dv)) != 0)
+        seen.push_back(dv * row + du * image.channels());
+    }
+  }
+  return seen;
+}
+
 PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const Pattern& pattern,
                      const InpaintParams& params)
     : columns_(level.hole.cols),

@@ -21,6 +21,9 @@ inline bool differ(const cv::Mat& labels, const cv::Point& p, const cv::Point& q
   return differ(labels.at<std::uint8_t>(p), labels.at<std::uint8_t>(q));
 }
 
+// What is known of the patch around a place, in floats of the image from its middle.
+std::vector<int> knownAround(const cv::Point& p, const cv::Mat& known, const cv::Mat& image);
+
 // What it costs to copy the patch around q to p: how unlike they look, in squared code values
 // summed over the patch, and how little like the places are. Patches must lie within the picture.
 class PatchCost {
@@ -35,7 +38,7 @@ class PatchCost {
   // @param lively CV_32FC1: mean of its last channel over the patch around every pixel
   float distance(const cv::Mat& image, const cv::Mat& lively, const cv::Point& p,
                  const cv::Point& q, float bound) const;
-  // By a part of the patch: `seen`, in floats of the image from its middle.
+  // By a part of the patch. @param seen knownAround()
   float partialDistance(const cv::Mat& image, const cv::Point& p, const cv::Point& q,
                         const std::vector<int>& seen, float bound) const;
 
@@ -46,6 +49,11 @@ class PatchCost {
   int surfaceAt(const cv::Point& p) const { return at(p).surface; }
   bool onOther(const cv::Point& p, const cv::Point& q) const {
     return differ(at(p).surface, at(q).surface);
+  }
+  // Unlike planes, what is none may be many things, some of which look like others.
+  bool onOtherPlane(const cv::Point& p, const cv::Point& q) const {
+    return onOther(p, q) && surfaceAt(p) != InpaintParams::kNoPlane &&
+           surfaceAt(q) != InpaintParams::kNoPlane;
   }
 
  private:

@@ -263,11 +263,13 @@ class Filling {
     std::vector<cv::Point> tried;  // its neighbours mostly lead to the same few places
   };
 
+  // Nothing that is peeled along its plane is led off it again.
   void attempt(const cv::Point& p, cv::Point q, Guess& guess) const {
     q = rules_.onPattern(p, q);
-    const float cost = sources_.contains(q)
-                           ? rules_.partialDistance(image_, p, q, guess.seen, guess.least)
-                           : guess.least;
+    const bool allowed = sources_.contains(q) && !(along_surfaces_ && rules_.onOtherPlane(p, q) &&
+                                                   sources_.anyOn(rules_.surfaceAt(p)));
+    const float cost =
+        allowed ? rules_.partialDistance(image_, p, q, guess.seen, guess.least) : guess.least;
     if (cost < guess.least) guess.least = cost, guess.best = q;
   }
 
@@ -280,7 +282,7 @@ class Filling {
 
   // Among places all over the picture.
   Guess firstGuess(const cv::Point& p, const cv::Mat& known) const {
-    Guess guess{knownAround(p, known), somewhere(p, 0), 0.0f, {}};
+    Guess guess{knownAround(p, known, image_), somewhere(p, 0), 0.0f, {}};
     guess.least = rules_.partialDistance(image_, p, guess.best, guess.seen, 1e30f);
     const int guesses = along_surfaces_ ? kGuessesAnew : kFirstGuesses;
     for (int i = 1; i < guesses; ++i) attempt(p, somewhere(p, i), guess);
@@ -304,19 +306,6 @@ class Filling {
         attempt(p, guess.best + jitter(p, kFirstGuesses + 8 * i + reach, reach), guess);
     }
     to_.at<cv::Vec2s>(p) = shorts(guess.best);
-  }
-
-  // What is known of the patch around a place.
-  std::vector<int> knownAround(const cv::Point& p, const cv::Mat& known) const {
-    const int row = static_cast<int>(image_.step1());
-    std::vector<int> seen;
-    for (int dv = -kPatchRadius; dv <= kPatchRadius; ++dv) {
-      for (int du = -kPatchRadius; du <= kPatchRadius; ++du) {
-        if (known.at<std::uint8_t>(p + cv::Point(du, dv)) != 0)
-          seen.push_back(dv * row + du * image_.channels());
-      }
-    }
-    return seen;
   }
 
   cv::Vec4f meanVote(const cv::Point& pixel, const cv::Mat& weights) const {
