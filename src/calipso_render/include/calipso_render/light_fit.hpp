@@ -58,6 +58,8 @@ struct LightEvidence {
   // Linear colour of what lies below the objects, mean 1: grey where no support plane is seen.
   cv::Vec3f below = {1.0f, 1.0f, 1.0f};
   float below_brightness = 0.0f;  // its mean, linear; 0: none is seen
+  // Linear, mean of what is seen beside the objects, and so about behind them; 0: nothing is.
+  cv::Vec3f behind = {};
   // Visible part (0 or 1) of a sun in direction l from a sample; empty: nothing is in the way.
   std::function<float(const LightSample&, const Eigen::Vector3f& l)> visible;
   // How badly cast shadows agree with a sun in direction l: minus a log-likelihood, 0 = no shadow

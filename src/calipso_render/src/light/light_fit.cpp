@@ -33,10 +33,10 @@ constexpr double kRobust = 0.15;  // relative residual beyond which a pixel coun
 constexpr double kLogRange = 4.0;
 // relative, of the shading of a sample, of which so many err independently of each other
 constexpr double kShadingError = 0.1, kIndependentSamples = 50.0;
-constexpr int kSplits = 2;                // rounds of telling reflectances of one hue apart
-constexpr float kDielectric = 0.04f;      // reflectance at normal incidence, refraction 1.5
-constexpr float kBrightestGround = 0.9f;  // reflectance
-constexpr double kPriorWeight = 0.05;     // of one prior, as a part of all pixels
+constexpr int kSplits = 2;               // rounds of telling reflectances of one hue apart
+constexpr float kDielectric = 0.04f;     // reflectance at normal incidence, refraction 1.5
+constexpr float kBrightestPlace = 0.9f;  // reflectance
+constexpr double kPriorWeight = 0.05;    // of one prior, as a part of all pixels
 
 // Every parameter of the model; blocks as in ReflectanceCost.
 struct Unknowns {
@@ -283,20 +283,31 @@ LightFit fitShading(const LightEvidence& evidence, const Eigen::Vector3f& up) {
   return best;
 }
 
-// Ambient light from below is told by few pixels, dark ones, and in units that only the surroundings'
-// strength ties to the picture's. What is mirrored there needs neither: the picture shows it, and a
-// dielectric mirrors a known part, F_0, of it.
-//   G = (F_0 / kb) I    G  the ground, in the light's units    I  its radiance in the picture
-// Where that is brighter than almost white under the light found, kb is not a dielectric's.
-void mirrorGround(const LightEvidence& evidence, const Eigen::Vector3f& up, LightFit& fit) {
-  if (!(evidence.below_brightness > 0.0f) || !(fit.gloss.around > 0.0f)) return;
-  cv::Vec3f ground = evidence.below * (evidence.below_brightness * kDielectric / fit.gloss.around);
-  const cv::Vec3f white = kBrightestGround * diffuseShading(fit.light, up, 1.0f);
+// What surfaces mirror from where a picture shows what is there. A dielectric mirrors a known part,
+// F_0, of it, and so it needs neither the light's unit nor what dark pixels tell of light from below.
+//   G = (F_0 / kb) I    G  in the light's units    I  radiance in the picture
+// Where that is brighter than almost white under the light found, kb is not a dielectric's. All of it
+// is put straight towards the place, none of it the other way.
+void mirrorPlace(const Eigen::Vector3f& towards, const cv::Vec3f& radiance,
+                 const Eigen::Vector3f& up, LightFit& fit) {
+  const cv::Vec3f place = radiance * (kDielectric / fit.gloss.around),
+                  white = kBrightestPlace * diffuseShading(fit.light, up, 1.0f);
   float part = 1.0f;
-  for (int c = 0; c < 3; ++c) part = std::min(part, white[c] / std::max(ground[c], 1e-6f));
-  const cv::Vec3f more = 0.5f * (part * ground - ambientAt(fit.light, -up));
-  fit.light.mirrored[0] = more;  // all of it straight below, none of it overhead
-  for (int i = 0; i < 3; ++i) fit.light.mirrored[1 + i] = more * -up[(i + 1) % 3];
+  for (int c = 0; c < 3; ++c) part = std::min(part, white[c] / std::max(place[c], 1e-6f));
+  const cv::Vec3f more = 0.5f * (part * place - ambientAt(asMirrored(fit.light), towards));
+  fit.light.mirrored[0] += more;
+  // Band 1 is ordered y, z, x.
+  for (int i = 0; i < 3; ++i) fit.light.mirrored[1 + i] += more * towards[(i + 1) % 3];
+}
+
+// The ground, and what the objects' rims mirror: at grazing views that lies behind them.
+// @param view towards the camera
+void mirrorPlaces(const LightEvidence& evidence, const Eigen::Vector3f& up,
+                  const Eigen::Vector3f& view, LightFit& fit) {
+  if (!(fit.gloss.around > 0.0f)) return;
+  if (evidence.below_brightness > 0.0f)
+    mirrorPlace(-up, evidence.below * evidence.below_brightness, up, fit);
+  if (evidence.behind != cv::Vec3f()) mirrorPlace(-view, evidence.behind, up, fit);
 }
 
 }  // namespace
@@ -343,7 +354,7 @@ LightFit fitLight(const LightEvidence& seen, const Eigen::Vector3f& up,
   if (best.seen_gloss.of_all) best.gloss = best.seen_gloss.of_all->gloss;
   best.gloss.around = surroundingsStrength(evidence, best);
   best.second_order = refineAmbient(evidence, best);
-  if (best.from_shadows) mirrorGround(evidence, up, best);
+  if (best.from_shadows) mirrorPlaces(evidence, up, view, best);
   return best;
 }
 

@@ -20,6 +20,8 @@ constexpr int kClustersPerObject = 4;
 // cosine to the viewer; flatter ones mirror more than the model knows
 constexpr float kGrazingView = 0.25f;
 constexpr int kBelowStep = 4, kFewestBelow = 100;  // px, places: of what lies below the objects
+constexpr int kBesideStep = 2,
+              kBeside = 40;         // px, and up to how many from the objects: beside them
 constexpr float kAround = 3.0f;     // of the objects' extent, in which it is looked at
 constexpr double kDarkest = 0.005;  // linear; darker has no colour
 
@@ -118,6 +120,25 @@ void lookBelow(const View& view, const std::vector<SupportPlane>& planes, LightE
   evidence.below_brightness = static_cast<float>(mean / count);
 }
 
+// LightEvidence's `behind`.
+void lookBehind(const View& view, LightEvidence& evidence) {
+  const cv::Mat objects = view.labels != 0;
+  cv::Mat beside;
+  cv::dilate(objects, beside, cv::Mat::ones(2 * kBeside + 1, 2 * kBeside + 1, CV_8U));
+  beside.setTo(0, objects);
+  cv::Vec3d sum;
+  int count = 0;
+  for (int v = 0; v < beside.rows; v += kBesideStep) {
+    for (int u = 0; u < beside.cols; u += kBesideStep) {
+      if (beside.at<std::uint8_t>(v, u) == 0) continue;
+      const cv::Vec3f code = view.codeAt(v, u);
+      for (int c = 0; c < 3; ++c) sum[c] += linearFromRealCode(code[c]);
+      ++count;
+    }
+  }
+  if (count > 0) evidence.behind = cv::Vec3f(sum / count);
+}
+
 // @param which of its objects, one for each
 RayScene sceneOf(const View& view, const std::vector<bool>& which) {
   std::vector<Occluder> occluders;
@@ -199,6 +220,7 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
                [&] {
                  evidence.samples = lightSamples(views, moves, evidence.clusters);
                  lookBelow(key, planes, evidence);
+                 lookBehind(key, evidence);
                },
                [&] { seen->fine = contrastBy(ShadowContrast::kFine); },
                [&] {
