@@ -18,6 +18,9 @@ constexpr int kAgree = 7;  // px; a shadow that stays covers most of such a squa
 constexpr float kLeastResting = 5.0f;  // code values: of Background::resting_spread
 constexpr float kMovingSpread = 2.2f;  // times what still places have, and
 constexpr float kLeastMoving = 2.0f;   // code values: from there on a place moves by itself
+// of its own gradients, what a place changes by if it moves by as large a part of a pixel: coded
+// texture at rest changes, too, though by less
+constexpr float kMovingPart = 0.25f;
 constexpr int kMovingGap = 12;         // px between moving places that move with them
 constexpr int kFewestMoving = 50;  // one part in so many of the picture; fewer are passing things
 constexpr int kRowsAround = 2;     // on either side of a row, for what moves in it,
@@ -88,15 +91,35 @@ void sharpenSeen(const std::vector<ClipFrame>& frames, const BackgroundParams& p
   }
 }
 
+// By how much the place changes from a pixel to the next in the channel where it does most, code
+// values, the mean around; what is not known does not count.
+cv::Mat gradientsAround(const Background& background) {
+  cv::Mat along_u, along_v, known, gradients(background.count.size(), CV_32F);
+  cv::Sobel(background.plate, along_u, CV_32F, 1, 0, 3, 1.0 / 8.0);
+  cv::Sobel(background.plate, along_v, CV_32F, 0, 1, 3, 1.0 / 8.0);
+  cv::erode(background.count > 0, known, cv::Mat::ones(3, 3, CV_8U));
+  for (int v = 0; v < gradients.rows; ++v) {
+    for (int u = 0; u < gradients.cols; ++u) {
+      float most = 0.0f;
+      for (int c = 0; c < 3; ++c)
+        most = std::max(most,
+                        std::hypot(along_u.at<cv::Vec3f>(v, u)[c], along_v.at<cv::Vec3f>(v, u)[c]));
+      gradients.at<float>(v, u) = known.at<std::uint8_t>(v, u) != 0 ? most : 0.0f;
+    }
+  }
+  cv::blur(gradients, gradients, {5, 5});
+  return gradients;
+}
+
 // Where the place moves by itself: it spreads over time, or the key frame shows something else than
 // the median does. Empty if there is little of it: passing things.
 cv::Mat movingPlaces(const ClipFrame& key, const Background& background) {
+  const cv::Mat least = kMovingPart * gradientsAround(background);
   const auto beyondNoise = [&](const cv::Mat& change) {
     cv::Mat smooth;
     cv::blur(change, smooth, {5, 5});
-    return cv::Mat(
-        smooth >
-        std::max(kLeastMoving, kMovingSpread * quantileOf(smooth, background.count > 0, 0.25)));
+    const float noise = kMovingSpread * quantileOf(smooth, background.count > 0, 0.25);
+    return cv::Mat((smooth > std::max(kLeastMoving, noise)) & (smooth > least));
   };
   const auto leaveOutShaded = [&](cv::Mat& change) {
     if (!background.shaded_at_times.empty()) change.setTo(0, background.shaded_at_times);
