@@ -362,6 +362,8 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
     known_of_place.planes.push_back(plane.fromPixels(key.camera));
   if (surfaces.empty()) known_of_place.supports = static_cast<int>(planes.size());
   inventPlace(traces, key, known_of_place, surfaces, params, p);
+  if (!p.background.live.empty())
+    p.background.passing = PassingThings(e.frames, params.background.mask_margin_px);
   if (e.camera_moves && !p.scenery.empty())
     followPlanes(surfaces, p.background.invented & (p.scenery == 0.0f), p.nearness);
   p.plate_linear = linearFromRealCodes(p.background.plate);

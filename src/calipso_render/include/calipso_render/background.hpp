@@ -7,6 +7,7 @@
 #include "calipso_render/drifting_background.hpp"
 #include "calipso_render/inpaint.hpp"
 #include "calipso_render/live_fill.hpp"
+#include "calipso_render/passing_things.hpp"
 #include "calipso_scene/scene.hpp"
 
 namespace calipso::render {
@@ -24,6 +25,7 @@ struct Background {
   cv::Mat invented;  // CV_8UC1: 255 where no frame shows it
   cv::Mat origin;    // CV_16SC2: where an invented pixel was copied from; (-1, -1) elsewhere
   LiveFill live;     // where an invented pixel's origin moves by itself; empty if nothing moves
+  PassingThings passing;        // of which it has no copies
   DriftingBackground drifting;  // the part of it that drifts as a whole
   double filling_ms = 0.0;      // wall time in which what is invented was filled
 };

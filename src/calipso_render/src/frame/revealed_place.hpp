@@ -23,6 +23,7 @@ class RevealedPlace {
   const StagedFrame& frame_;
   const SeenPlace& place_;
   const cv::Mat unmirrored_;  // CV_8UC3
+  cv::Mat covered_;           // CV_8UC1, != 0: something else than the place is seen
   LiveFill::Corrections corrections_;
 };
 
