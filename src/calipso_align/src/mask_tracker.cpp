@@ -12,6 +12,7 @@
 #include "calipso_align/mask_edge.hpp"
 #include "layer_appearance.hpp"
 #include "layer_search.hpp"
+#include "standing_before.hpp"
 
 namespace calipso::align {
 namespace {
@@ -111,6 +112,7 @@ TrackedMask MaskTracker::track(const cv::Mat& image) {
 
   occupied_ = cv::Mat::zeros(size_, CV_8U);
   for (const Object& object : objects_) occupied_ |= object.mask;
+  as_before_ = asBeforeAround(moving, image);
   const cv::Mat foreign = moving.empty() ? cv::Mat() : foreignBlocks(means, background_);
 // A single object leaves the processors to the loops over its pixels.
 #pragma omp parallel for schedule(dynamic) if (moving.size() > 1)
@@ -122,8 +124,11 @@ TrackedMask MaskTracker::track(const cv::Mat& image) {
         backwardFlow(grey, previous_grey_, object->mask, shift, params_.margin_px, *object->flow);
     cv::Mat rough = roughlyMoved(object->mask, flow, shift, params_.margin_px);
     if (object->shape) {
-      object->shape->moveAlong(previous_grey_, grey, flow, insideOf(rough));
+      object->shape->moveAlong(previous_grey_, grey, flow, insideOf(rough), object->hidden,
+                               as_before_);
       rough = object->shape->silhouette();
+      // What stood before it stands there still.
+      if (!object->hidden.empty()) rough.setTo(0, object->hidden);
     }
     follow(*object, image, flow, rough);
     object->reference_mean = means;
@@ -144,6 +149,16 @@ TrackedMask MaskTracker::combine() const {
     result.confidence = std::min(result.confidence, object.confidence);
   }
   return result;
+}
+
+// asBefore() where objects that move as their models do may be now.
+cv::Mat MaskTracker::asBeforeAround(const std::vector<Object*>& objects,
+                                    const cv::Mat& image) const {
+  cv::Rect part;
+  for (const Object* object : objects)
+    if (object->shape) part |= around(object->mask, params_.search_px + params_.margin_px);
+  if (part.empty()) return {};
+  return asBefore(image, background_, ~grown(occupied_, params_.margin_px), part);
 }
 
 void MaskTracker::follow(Object& object, const cv::Mat& image, const cv::Mat& flow,
@@ -299,14 +314,22 @@ void MaskTracker::cutContradicted(const Object& object, const cv::Mat& view, con
 
 // Takes the outline from the object's model, moved to where the colours have it, as long as it
 // meets what they say.
-bool MaskTracker::fitShape(Object& object, const cv::Mat& view, const Layers& layers,
-                           const cv::Rect& roi, Prediction& p) const {
+bool MaskTracker::fitShape(Object& object, const cv::Mat& view, const KnownBackground& background,
+                           const Layers& layers, const cv::Rect& roi, Prediction& p) const {
+  const cv::Mat known_look = p.coverage > 127, look = layers.fore.accounts.front().colour;
+  const auto standing = [&](const cv::Mat& distance) {
+    return as_before_.empty() ? cv::Mat::zeros(roi.size(), CV_8U)
+                              : standingBefore({distance, look, known_look}, background,
+                                               as_before_(roi), layers.back_noise);
+  };
+  object.hidden = cv::Mat();
   if (!object.shape) return false;
   object.shape->carryDetails(p.motion, roi);
   const cv::Mat expected = object.shape->distance(roi);
   const std::vector<cv::Mat> costs = costsOf(view, cv::abs(expected) <= params_.shape_search_px,
                                              expected, layers.back, layers.fore, 0.0f);
-  const cv::Mat others = grownIn(roi, occupied_ & ~object.mask, params_.band_px);
+  const cv::Mat others = grownIn(roi, occupied_ & ~object.mask, params_.band_px) |
+                         grown(standing(expected), params_.band_px);
   object.shape->meetOutline(costs[0] - costs[1], others, roi);
   if (!object.shape->holds()) {
     object.shape.reset();
@@ -314,6 +337,13 @@ bool MaskTracker::fitShape(Object& object, const cv::Mat& view, const Layers& la
   }
   p.distance = object.shape->distance(roi);
   p.mask = p.distance < 0.0;
+  const cv::Mat hidden = standing(p.distance);
+  if (cv::countNonZero(hidden) > 0) {
+    object.hidden = cv::Mat::zeros(size_, CV_8U);
+    hidden.copyTo(object.hidden(roi));
+    p.mask.setTo(0, hidden);
+    p.distance = signedDistance(p.mask);
+  }
   p.band = cv::abs(p.distance) <= params_.shape_band_px;
   return true;
 }
@@ -334,7 +364,7 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& fl
   const KnownBackground background = backgroundIn(roi, image, flow);
   const GaussianMixture ring_colours = GaussianMixture::fit(surroundings, params_.components);
   const Layers layers = layersOf(object, view, p, background, ring_colours, roi);
-  const bool shaped = fitShape(object, view, layers, roi, p);
+  const bool shaped = fitShape(object, view, background, layers, roi, p);
   cv::Mat labels = p.mask / 255;
   cutLabels(view, p.band,
             costsOf(view, p.band, p.distance, layers.back, layers.fore, params_.prior_limit),

@@ -128,9 +128,9 @@ bool RigidShape::holds() const { return state_->holds; }
 cv::Mat RigidShape::silhouette() const { return maskOf(state_->view, state_->camera); }
 
 void RigidShape::moveAlong(const cv::Mat& previous, const cv::Mat& now, const cv::Mat& flow,
-                           const cv::Mat& core) {
+                           const cv::Mat& core, const cv::Mat& hidden, const cv::Mat& as_before) {
   state_->before = state_->pose.camera_from_key;
-  state_->look = followSurface({previous, now, flow}, core, state_->camera, state_->view,
+  state_->look = followSurface({previous, now, flow, hidden, as_before}, core, state_->camera, state_->view,
                                state_->velocity, state_->pose);
   state_->least_difference = std::min(state_->least_difference, state_->look.difference);
   state_->draw();

@@ -88,14 +88,18 @@ struct Sample {
   std::array<float, kBlurs.size()> grey;  // at each blur
 };
 
+// @param hidden  FramePair::hidden
 std::vector<Sample> samplesOf(const std::vector<BlurredPart>& levels, const Camera& camera,
-                              const DepthRendering& before, const BodyPose& pose) {
+                              const DepthRendering& before, const BodyPose& pose,
+                              const cv::Mat& hidden) {
   const Eigen::Isometry3d key_from_camera = pose.camera_from_key.inverse();
   const auto positionAt = [&](int u, int v) -> Eigen::Vector3d {
     return before.at(u, v) * camera.ray(u, v);
   };
   std::vector<Sample> samples;
-  for (const cv::Point& p : thinnedOut(insideOf(before.depth > 0.0f))) {
+  cv::Mat seen = before.depth > 0.0f;
+  if (!hidden.empty()) seen.setTo(0, hidden(before.roi));
+  for (const cv::Point& p : thinnedOut(insideOf(seen))) {
     const cv::Point at = p + before.roi.tl();
     Sample sample{key_from_camera * positionAt(at.x, at.y),
                   (positionAt(at.x, at.y + 1) - positionAt(at.x, at.y - 1))
@@ -115,6 +119,22 @@ struct Guess {
   BodyPose pose;
   Eigen::Vector3d light = Eigen::Vector3d::Zero();
 };
+
+// Those that nothing may stand before.
+std::vector<Sample> samplesSeen(const std::vector<Sample>& samples, const cv::Mat& as_before,
+                                const Camera& camera, const BodyPose& pose) {
+  if (as_before.empty()) return samples;
+  std::vector<Sample> seen;
+  for (const Sample& sample : samples) {
+    const Eigen::Vector3d p = pose.camera_from_key * sample.point;
+    if (p.z() <= 0.0) continue;
+    const Eigen::Vector2d pixel = camera.project(p);
+    const cv::Point at(cvRound(pixel.x()), cvRound(pixel.y()));
+    if (!cv::Rect(cv::Point(), as_before.size()).contains(at) || !as_before.at<uchar>(at))
+      seen.push_back(sample);
+  }
+  return seen.size() < kFewest ? samples : seen;
+}
 
 struct Comparison {
   double difference = 0.0;
@@ -215,8 +235,9 @@ SurfaceLook followSurface(const FramePair& frames, const cv::Mat& core, const Ca
     then.push_back(blurred(frames.previous, part, blur));
     now.push_back(blurred(frames.now, part, blur));
   }
-  const std::vector<Sample> samples = samplesOf(then, camera, before, pose);
+  const std::vector<Sample> samples = samplesOf(then, camera, before, pose, frames.hidden);
   SurfaceLook best;
+  double told = best.difference;
   if (samples.size() < kFewest) return best;
   for (const BodyPose& start : starts) {
     Guess end{start};
@@ -227,7 +248,11 @@ SurfaceLook followSurface(const FramePair& frames, const cv::Mat& core, const Ca
     if (found.difference >= best.difference) continue;
     best = {found.difference, found.equations.matrix};
     pose = end.pose;
+    told = compare(samplesSeen(samples, frames.as_before, camera, end.pose), now.size() - 1,
+                   now.back(), camera, end)
+               .difference;
   }
+  best.difference = told;
   return best;
 }
 

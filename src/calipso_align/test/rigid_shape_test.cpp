@@ -166,6 +166,34 @@ TEST(MaskTracker, WhatLooksLikeAModelledBodyDoesNotTakeItOver) {
   }
 }
 
+// A post stands before the place through which it goes: what of it comes out beyond is its own again.
+TEST(MaskTracker, GoesOnBeyondAPostThatHidesItInPart) {
+  const PaintedPear pear;
+  const cv::Rect post(250, 0, 18, pear.mask(motionAt(0)).rows);
+  const auto motion = [](int frame) { return motionAt(2 * frame); };
+  const auto truth = [&](int frame) {
+    cv::Mat mask = pear.mask(motion(frame)).clone();
+    mask(post).setTo(0);
+    return mask;
+  };
+  const auto picture = [&](int frame) {
+    cv::Mat image = pear.picture(motion(frame), frame + 1);
+    cv::RNG rng(100 + frame);
+    for (int v = post.y; v < post.br().y; ++v)
+      for (int u = post.x; u < post.br().x; ++u)
+        for (int c = 0; c < 3; ++c)
+          image.at<cv::Vec3b>(v, u)[c] = cv::saturate_cast<uchar>(
+              40.0 + 45.0 * c + 10.0 * std::sin(0.9 * u) + rng.gaussian(2.0));
+    return image;
+  };
+  MaskTracker tracker(picture(0), truth(0) / 255, {{1, pear.surface()}});
+  for (int k = 1; k <= 10; ++k) {
+    const cv::Mat found = tracker.track(picture(k)).labels == 1;
+    EXPECT_GE(intersectionOverUnion(found, truth(k)), 0.95) << "frame " << k;
+    EXPECT_LE(cv::countNonZero(found(post)), post.area() / 50) << "frame " << k;
+  }
+}
+
 // At rest a surface looks the same in every frame; turning, it does not, and shows new sides.
 TEST(RigidShape, HoldsWhenABodyThatRestedStartsToTurn) {
   const PaintedPear pear;

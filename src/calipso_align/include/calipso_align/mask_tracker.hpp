@@ -69,6 +69,7 @@ class MaskTracker {
     float confidence = 1.0f;
     cv::Ptr<cv::DISOpticalFlow> flow;  // has buffers of its own
     std::optional<RigidShape> shape;   // while the object moves as its model does
+    cv::Mat hidden;  // CV_8U, or empty: what stands before it, as far as its shape tells
   };
 
   // Where the motion of an object's layer puts it, on a part of the picture.
@@ -86,6 +87,7 @@ class MaskTracker {
   KnownBackground backgroundIn(const cv::Rect& roi, const cv::Mat& image,
                                const cv::Mat& flow) const;
   void follow(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough);
+  cv::Mat asBeforeAround(const std::vector<Object*>& objects, const cv::Mat& image) const;
   void lose(Object& object) const;
   // Takes up the lost objects that have come back.
   void takeUpAgain(const cv::Mat& image, const cv::Mat& means);
@@ -109,8 +111,8 @@ class MaskTracker {
   void cutContradicted(const Object& object, const cv::Mat& view, const Prediction& prediction,
                        const KnownBackground& background, const Layers& layers, const cv::Rect& roi,
                        cv::Mat& labels) const;
-  bool fitShape(Object& object, const cv::Mat& view, const Layers& layers, const cv::Rect& roi,
-                Prediction& prediction) const;
+  bool fitShape(Object& object, const cv::Mat& view, const KnownBackground& background,
+                const Layers& layers, const cv::Rect& roi, Prediction& prediction) const;
   cv::Mat othersIn(const Object& object, const cv::Mat& view, const cv::Mat& predicted,
                    const cv::Rect& roi) const;
   void checkInput(const cv::Mat& image, const cv::Mat& labels) const;
@@ -120,6 +122,7 @@ class MaskTracker {
   std::vector<Object> objects_;
   cv::Mat previous_image_, previous_grey_, previous_means_;
   cv::Mat occupied_;            // CV_8U: any object of the previous frame
+  cv::Mat as_before_;           // CV_8U, or empty: shows the background as it was
   cv::Mat suspects_;            // CV_8U, or empty: may be an object that was lost, and comes back
   KnownBackground background_;  // the whole picture
 };

@@ -23,9 +23,10 @@ class RigidShape {
   bool holds() const;
 
   // Moves on to the next frame: `previous` and `now` CV_8U, flow backward, core: CV_8U, where the
-  // flow is the object's.
+  // flow is the object's; hidden, as_before: CV_8U, may be empty: what stood before it in the
+  // previous frame, and where this one shows the background as it was.
   void moveAlong(const cv::Mat& previous, const cv::Mat& now, const cv::Mat& flow,
-                 const cv::Mat& core);
+                 const cv::Mat& core, const cv::Mat& hidden = {}, const cv::Mat& as_before = {});
 
   // The silhouette: CV_8U 0 or 255, the whole picture.
   cv::Mat silhouette() const;
