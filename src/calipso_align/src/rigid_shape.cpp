@@ -130,8 +130,8 @@ cv::Mat RigidShape::silhouette() const { return maskOf(state_->view, state_->cam
 void RigidShape::moveAlong(const cv::Mat& previous, const cv::Mat& now, const cv::Mat& flow,
                            const cv::Mat& core, const cv::Mat& hidden, const cv::Mat& as_before) {
   state_->before = state_->pose.camera_from_key;
-  state_->look = followSurface({previous, now, flow, hidden, as_before}, core, state_->camera, state_->view,
-                               state_->velocity, state_->pose);
+  state_->look = followSurface({previous, now, flow, hidden, as_before}, core, state_->camera,
+                               state_->view, state_->velocity, state_->pose);
   state_->least_difference = std::min(state_->least_difference, state_->look.difference);
   state_->draw();
 }

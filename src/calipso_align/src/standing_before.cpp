@@ -10,8 +10,8 @@ namespace {
 constexpr double kStillNoise = 4.0;              // grey levels; more differs where a camera moves
 constexpr double kSame = 2.5, kDifferent = 6.0;  // deviations of a pixel's colour
 constexpr int kPiece = 5;                        // px
-constexpr float kDeep = 3.0f;  // px inside the outline, to which that is known
-constexpr int kReach = 8;      // px that it goes on from there
+constexpr float kDeep = 3.0f;                    // px inside the outline, to which that is known
+constexpr int kReach = 8;                        // px that it goes on from there
 
 // CV_8U: 255 where two pictures differ by less than so many deviations.
 cv::Mat within(const cv::Mat& a, const cv::Mat& b, double deviations, double noise) {

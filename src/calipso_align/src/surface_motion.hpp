@@ -19,8 +19,8 @@ struct SurfaceLook {
 struct FramePair {
   cv::Mat previous, now;  // CV_8U
   cv::Mat flow;           // CV_32FC2
-  // CV_8U, may be empty: where something stood before the body in the previous frame; where this one
-  // shows the background as it was, so that something may stand before it
+  // CV_8U, may be empty: where something stood before the body in the previous frame; where this
+  // one shows the background as it was, so that something may stand before it
   cv::Mat hidden = {}, as_before = {};
 };
 

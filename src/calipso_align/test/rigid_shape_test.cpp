@@ -166,7 +166,7 @@ TEST(MaskTracker, WhatLooksLikeAModelledBodyDoesNotTakeItOver) {
   }
 }
 
-// A post stands before the place through which it goes: what of it comes out beyond is its own again.
+// A post stands before the place through which it goes: what comes out beyond is its own again.
 TEST(MaskTracker, GoesOnBeyondAPostThatHidesItInPart) {
   const PaintedPear pear;
   const cv::Rect post(250, 0, 18, pear.mask(motionAt(0)).rows);

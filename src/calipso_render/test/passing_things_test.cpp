@@ -77,8 +77,8 @@ ClipFrame wavesAroundBall(int k, const ObjectModel& model) {
         f.bgr.at<cv::Vec3b>(v, u) = cv::Vec3b::all(
             cv::saturate_cast<std::uint8_t>(120.0 + 40.0 * std::sin(0.9 * u + 0.6 * v + 1.9 * k)));
   }
-  const cv::Rect red = cv::Rect(10 * k - 10, hidden.y, 20, hidden.height) &
-                       cv::Rect({0, 0}, f.bgr.size());
+  const cv::Rect red =
+      cv::Rect(10 * k - 10, hidden.y, 20, hidden.height) & cv::Rect({0, 0}, f.bgr.size());
   f.bgr(red).setTo(cv::Scalar(30, 40, 220), f.labels(red) == 0);
   return f;
 }

@@ -21,7 +21,7 @@ constexpr float kLeastMoving = 2.0f;   // code values: from there on a place mov
 // of its own gradients, what a place changes by if it moves by as large a part of a pixel: coded
 // texture at rest changes, too, though by less
 constexpr float kMovingPart = 0.25f;
-constexpr int kMovingGap = 12;         // px between moving places that move with them
+constexpr int kMovingGap = 12;     // px between moving places that move with them
 constexpr int kFewestMoving = 50;  // one part in so many of the picture; fewer are passing things
 constexpr int kRowsAround = 2;     // on either side of a row, for what moves in it,
 constexpr float kResting = 0.15f;  // and the part of it, or of a plane, up to which it rests

@@ -11,7 +11,7 @@ namespace calipso::render {
 namespace {
 
 constexpr int kSquare = 4;            // px
-constexpr float kLeastClear = 0.2f;    // of a mean's surroundings that must be seen
+constexpr float kLeastClear = 0.2f;   // of a mean's surroundings that must be seen
 constexpr std::size_t kFewest = 5;    // frames that tell what is usual
 constexpr float kLeast = 12.0f;       // code values by which what passes differs from it, and
 constexpr float kDeviations = 10.0f;  // times the lower quartile of how a place itself does
