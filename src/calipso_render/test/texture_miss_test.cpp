@@ -101,6 +101,27 @@ TEST(TextureMiss, ShadeOfTheKeyFrameAloneIsNotProjectedBack) {
   EXPECT_LT(dark, a.texture.texels.size() / 1000);
 }
 
+// Where the further frames' pattern lies beside the key frame's, the key frame misses much of it. What
+// no frame shows takes the key frame's colours, not these with that added.
+TEST(TextureMiss, WhatIsMissedIsNotCopiedToUnseenSides) {
+  const Surface surface = makeSurface(ballAt(kPlace));
+  const std::vector<View> views = patternedViews(surface, kCoarse, 0.0f, 0.01f);
+  const Appearance a = makeAppearances(views, {true}, evenLight(), {Gloss()}).front();
+  const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>();
+  const Points& x = surface.key_vertices;
+  int texels = 0, too_much = 0;
+  for (int t = 0; t < a.texture.triangleCount(); ++t) {
+    const Eigen::Vector3i& c = surface.triangles[t];
+    const Eigen::Vector3f at = (x[c[0]] + x[c[1]] + x[c[2]]) / 3.0f,
+                          arm = at - kPlace.cast<float>();
+    if (arm.normalized().dot((eye - at).normalized()) > -0.6f) continue;
+    for (std::size_t i = a.texture.firstOf(t); i < a.texture.firstOf(t + 1); ++i)
+      ++texels, too_much += std::abs(a.texture.texels[i][1] - 0.34f) > 0.22f;
+  }
+  ASSERT_GT(texels, 1000);
+  EXPECT_LT(too_much, texels / 100);
+}
+
 TEST(TextureMiss, GrainIsWhatPixelsDeviateByThemselves) {
   const Surface surface = makeSurface(ballAt(kPlace));
   const auto grain = [&](float noise) {

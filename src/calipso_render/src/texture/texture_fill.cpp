@@ -73,16 +73,12 @@ class TextureFill {
                                mostTexels(camera, views_.size()));
     Origins origins(a.texture.size());
     for (const Reflectance& r : pictures_) shown_.push_back(r.albedo);
-    shown_[0] = a.albedo;
+    shown_[0] = copied_ = a.albedo;
     beside_details_ = besideDetails(pictures_[0], surface_);
     findLooks(a.texture);
     makeTexels(a.texture, origins);
     findLike(a.texture, origins);
-    if (views_.size() > 1) {
-#pragma omp parallel for schedule(dynamic, 1)
-      for (std::size_t i = 0; i < views_.size(); ++i)
-        shown_[i] = sharpened(shown_[i], pictures_[i], *actors_[i], a.texture);
-    }
+    if (views_.size() > 1) copied_ = sharpen({views_, actors_, pictures_}, a.texture, shown_);
     makeTexels(a.texture, origins);
     if (views_.size() > 1) copyLike(a.texture, origins);
     if (views_.size() > 1) a.grain = grainOf({views_, actors_, pictures_}, a.texture);
@@ -357,7 +353,7 @@ class TextureFill {
                      Layers& layers) const {
     const Place place = shapePlaceOf(triangle, w);
     const auto add = [&](const Sighting& l, float part) {
-      layers.add(part > 0.0f ? colourOf(sampleBicubic(shown_[0], l.u, l.v)) : cv::Vec3f(), part);
+      layers.add(part > 0.0f ? colourOf(sampleBicubic(copied_, l.u, l.v)) : cv::Vec3f(), part);
     };
     for (const LikePlace& like : like_) {
       if (layers.open == 0.0f) return;
@@ -389,8 +385,10 @@ class TextureFill {
   std::vector<Looks> looks_;     // per triangle
   cv::Mat beside_details_;       // besideDetails() of the key frame's picture
   std::vector<LikePlace> like_;  // best first; none before findLike()
-  std::vector<cv::Mat>
-      shown_;  // per picture, CV_32FC4: the reflectance that the texture is made of
+  // Per picture, CV_32FC4: the reflectance that the texture is made of; the key frame's as like
+  // places take it.
+  std::vector<cv::Mat> shown_;
+  cv::Mat copied_;
 };
 
 }  // namespace

@@ -54,6 +54,31 @@ float gainTo(float now, float own) {
   return 1.0f + part * (now / own - 1.0f);
 }
 
+// @param drawn as of drawnInto(), of a picture whose own reflectance is `albedo`. CV_32FC4
+cv::Mat gainsTo(const cv::Mat& drawn, const cv::Mat& albedo, const cv::Mat& trust) {
+  const cv::Mat own = meanAround(albedo, trust), now = meanAround(drawn, trust);
+  cv::Mat gain(drawn.size(), CV_32FC4, cv::Scalar::all(1));
+  for (int v = 0; v < gain.rows; ++v) {
+    for (int u = 0; u < gain.cols; ++u) {
+      for (int c = 0; c < 3; ++c)
+        gain.at<cv::Vec4f>(v, u)[c] =
+            gainTo(now.at<cv::Vec4f>(v, u)[c], own.at<cv::Vec4f>(v, u)[c]);
+    }
+  }
+  return gain;
+}
+
+void addMissed(const cv::Mat& missed, const cv::Mat& trust, cv::Mat& shown) {
+  for (int v = 0; v < shown.rows; ++v) {
+    for (int u = 0; u < shown.cols; ++u) {
+      cv::Vec4f& colour = shown.at<cv::Vec4f>(v, u);
+      for (int c = 0; c < 3; ++c)
+        colour[c] =
+            std::max(0.0f, colour[c] + trust.at<float>(v, u) * missed.at<cv::Vec4f>(v, u)[c]);
+    }
+  }
+}
+
 // What the picture has beyond a drawn reflectance, code values. CV_32FC3.
 // @param certain out, CV_8UC1: where it can be told
 cv::Mat missedCodes(const Reflectance& picture, const cv::Mat& drawn, cv::Mat& certain) {
@@ -102,27 +127,23 @@ std::vector<Detail> detailsOf(const Reflectance& picture, const cv::Mat& drawn) 
 
 }  // namespace
 
-cv::Mat sharpened(const cv::Mat& shown, const Reflectance& picture, const Actor& actor,
-                  const SurfaceTexture& texture) {
-  const cv::Mat drawn = drawnInto(picture, actor, texture);
-  cv::Mat trust = picture.trust.mul(picture.clear);
-  trust.setTo(0.0f, picture.triangle < 0);
-  const cv::Mat own_around = meanAround(picture.albedo, trust),
-                now_around = meanAround(drawn, trust);
-  cv::Mat out = shown.clone();
-  for (int v = 0; v < out.rows; ++v) {
-    for (int u = 0; u < out.cols; ++u) {
-      const cv::Vec4f &own = picture.albedo.at<cv::Vec4f>(v, u), &now = drawn.at<cv::Vec4f>(v, u);
-      cv::Vec4f& colour = out.at<cv::Vec4f>(v, u);
-      for (int c = 0; c < 3; ++c) {
-        const float gain =
-            gainTo(now_around.at<cv::Vec4f>(v, u)[c], own_around.at<cv::Vec4f>(v, u)[c]);
-        colour[c] =
-            std::max(0.0f, gain * colour[c] + trust.at<float>(v, u) * (gain * own[c] - now[c]));
-      }
-    }
+cv::Mat sharpen(const SeenObject& object, const SurfaceTexture& texture,
+                std::vector<cv::Mat>& shown) {
+  cv::Mat key;
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    const Reflectance& picture = object.pictures[i];
+    const cv::Mat drawn = drawnInto(picture, *object.actors[i], texture);
+    cv::Mat trust = picture.trust.mul(picture.clear);
+    trust.setTo(0.0f, picture.triangle < 0);
+    const cv::Mat gain = gainsTo(drawn, picture.albedo, trust);
+    cv::Mat level;  // not shown[i], whose values the picture may hold, too
+    cv::multiply(shown[i], gain, level);
+    if (i == 0) key = level.clone();
+    addMissed(gain.mul(picture.albedo) - drawn, trust, level);
+    shown[i] = level;
   }
-  return out;
+  return key;
 }
 
 float grainOf(const SeenObject& object, const SurfaceTexture& texture) {
