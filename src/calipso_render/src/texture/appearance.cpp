@@ -16,6 +16,7 @@
 #include "place/masked_quantile.hpp"
 #include "smooth_step.hpp"
 #include "texture/false_shade.hpp"
+#include "texture/highlight_remains.hpp"
 #include "texture/mesh_topology.hpp"
 #include "texture/picture_trust.hpp"
 #include "texture/rim_hue.hpp"
@@ -132,20 +133,29 @@ Shaded lightOn(const Actor& actor, const cv::Rect& region, const Camera& camera,
   return s;
 }
 
-// Reflectance::clear, of the least clear pixel around. A highlight hides what it outshines: of dark
-// things on a bright object more is told than is lost as long as it is little against that.
+// Part of a pixel's light, or of that of the object's bright ones, that is the sun's highlight.
 // @param codes CV_32FC3 @param object CV_8UC1, 255 on it
-cv::Mat clearOf(const cv::Mat& codes, const cv::Mat& object, const cv::Mat& glint) {
-  cv::Mat clear(glint.size(), CV_32F);
+cv::Mat lobeOf(const cv::Mat& codes, const cv::Mat& object, const cv::Mat& glint) {
+  cv::Mat lobe(glint.size(), CV_32F);
   const cv::Mat brightness = luminanceOf(codes);
   const float bright = quantileOf(brightness, object, kBright);
 #pragma omp parallel for schedule(static)
+  for (int v = 0; v < lobe.rows; ++v) {
+    for (int u = 0; u < lobe.cols; ++u)
+      lobe.at<float>(v, u) =
+          glint.at<float>(v, u) / std::max({brightness.at<float>(v, u), bright, kDarkest});
+  }
+  return lobe;
+}
+
+// Reflectance::clear, of the least clear pixel around. A highlight hides what it outshines: of dark
+// things on a bright object more is told than is lost as long as it is little against that.
+cv::Mat clearOf(const cv::Mat& lobe) {
+  cv::Mat clear(lobe.size(), CV_32F);
   for (int v = 0; v < clear.rows; ++v) {
-    for (int u = 0; u < clear.cols; ++u) {
-      const float all = std::max({brightness.at<float>(v, u), bright, kDarkest});
-      const float hidden = smoothStep(kGlossy * all, kAllGloss * all, glint.at<float>(v, u));
-      clear.at<float>(v, u) = std::max(kLeastClear, 1.0f - hidden);
-    }
+    for (int u = 0; u < clear.cols; ++u)
+      clear.at<float>(v, u) =
+          std::max(kLeastClear, 1.0f - smoothStep(kGlossy, kAllGloss, lobe.at<float>(v, u)));
   }
   cv::erode(clear, clear, cv::Mat::ones(3, 3, CV_8U));
   return clear;
@@ -170,7 +180,8 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   r.open = shaded.sky;
   view.picture(r.region).convertTo(r.codes, CV_32F);
   unmixHue(view.labels(r.region) == actor.surface->index, r.codes);
-  r.clear = clearOf(r.codes, view.labels(r.region) == actor.surface->index, shaded.glint);
+  const cv::Mat lobe = lobeOf(r.codes, view.labels(r.region) == actor.surface->index, shaded.glint);
+  r.clear = clearOf(lobe);
   r.mean_light = mean_light.value_or(shaded.mean);
   const cv::Vec3f floor = lightFloor(r.mean_light);
   r.trust = trustOf(view.labels, actor.surface->index, r.region);
@@ -196,6 +207,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
       if (part > kWellLit) well_lit.at<std::uint8_t>(v, u) = 255;
     }
   }
+  hideRemains(r.albedo, r.trust, lobe, r.clear);
   lowerBesideJumps(view.camera, kJump * boxOf(actor.surface->key_vertices).diagonal().norm(), r);
   if (alone) lowerAtSteps(shaded.light, shaded.open, r);
   trustDetails(view.labels, *actor.surface, r);
