@@ -160,6 +160,28 @@ TEST(TexturePatches, AnUnseenSideShowsThePatternOfTheOthers) {
   EXPECT_GT(dark + bright, 0.75f * all);  // the rest lies on borders of the pattern
 }
 
+// Red discs in the pattern, one on each side, are not repeated on the one that nothing shows.
+TEST(TexturePatches, ASingleMotifIsNotRepeated) {
+  Patterned cube(true);
+  const cv::Vec4f red(0.02f, 0.02f, 0.5f, 1.0f);
+  for (int t = 0; t < cube.texture.triangleCount(); ++t) {
+    for (std::size_t i = cube.texture.firstOf(t); i < cube.texture.firstOf(t + 1); ++i) {
+      const Eigen::Vector3f w = cube.texture.weightsOf(t, i - cube.texture.firstOf(t));
+      Eigen::Vector3f p = Eigen::Vector3f::Constant(-0.5f);
+      for (int k = 0; k < 3; ++k) p += w[k] * cube.mesh.vertices[cube.mesh.triangles[t][k]];
+      if (!cube.unknown(t) && p.norm() < 0.54f) cube.texture.texels[i] = red;
+    }
+  }
+  cube.fill();
+  int found = 0;
+  for (int t = 0; t < cube.texture.triangleCount(); ++t) {
+    for (std::size_t i = cube.texture.firstOf(t);
+         cube.unknown(t) && i < cube.texture.firstOf(t + 1); ++i)
+      found += cube.texture.texels[i][2] > 2.0f * cube.texture.texels[i][1];
+  }
+  EXPECT_EQ(found, 0);
+}
+
 TEST(TexturePatches, WhatIsKnownStays) {
   Patterned cube(true);
   const std::vector<cv::Vec4f> before = cube.texture.texels;

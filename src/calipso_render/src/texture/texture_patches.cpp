@@ -4,11 +4,13 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/inpaint.hpp"
 #include "smooth_step.hpp"
 #include "texture/mesh_topology.hpp"
+#include "texture/pattern_motifs.hpp"
 #include "texture/surface_chart.hpp"
 
 namespace calipso::render {
@@ -27,6 +29,7 @@ constexpr double kPatternSize = 3.0;
 constexpr double kPlain = 6.0;
 constexpr int kPatternSide = 25;  // px of the square in which that is looked at
 constexpr double kAllOver = 0.8;  // of the best seen part on which there must be more
+constexpr int kGoesOn = 13;       // px of the square within which a single motif goes on
 constexpr int kMostCharts = 60;
 constexpr int kFewest = 400;  // px of the best seen part that make a sample of the pattern
 
@@ -67,6 +70,7 @@ class PatternFill {
     if (best < 0) return;
     sample_ = draw(unfolder_.around(best, down_, kRadius * pixel_));
     if (!hasPattern()) return;
+    motifs_.emplace(sample_.colour, sample_.known);
     leaveOtherParts(best, unknown);
     for (int i = 0; i < kMostCharts; ++i) {
       const int seed = nextSeed(unknown);
@@ -191,7 +195,12 @@ class PatternFill {
     cv::Mat around;  // so that whole patches are there to compare
     cv::dilate(unknown, around, cv::Mat::ones(2 * kMargin + 1, 2 * kMargin + 1, CV_8U));
     cv::Mat(unknown | (around & (chart.laid == 0))).copyTo(hole(left));
-    banned(left).setTo(0, chart.known), banned(right).setTo(0, sample_.known);
+    // A single motif goes on where it meets what is not known.
+    cv::Mat beside;
+    cv::dilate(unknown, beside, cv::Mat::ones(kGoesOn, kGoesOn, CV_8U));
+    const cv::Mat near = chart.known & (beside | ~motifs_->in(chart.colour, chart.known)),
+                  far = sample_.known & ~motifs_->in(sample_.colour, sample_.known);
+    banned(left).setTo(0, near), banned(right).setTo(0, far);
     InpaintParams params;
     params.away_row = params.away_column = 0.0f;
     params.from_anywhere = true;  // the sample lies beside the chart
@@ -226,9 +235,10 @@ class PatternFill {
   SurfaceUnfolder unfolder_;
   std::vector<float>& certain_;
   SurfaceTexture& texture_;
-  SurfaceTexture known_;  // the same colours, and how far they are known
-  float pixel_ = 0.0f;    // m, of charts' pictures
-  ChartPicture sample_;   // of the best seen part
+  SurfaceTexture known_;                 // the same colours, and how far they are known
+  float pixel_ = 0.0f;                   // m, of charts' pictures
+  ChartPicture sample_;                  // of the best seen part
+  std::optional<PatternMotifs> motifs_;  // of the sample
 };
 
 }  // namespace
