@@ -26,6 +26,8 @@ namespace {
 // beside the key frame: those that tell the light, and that show the objects' reflectance
 constexpr std::size_t kLightViews = 5;
 constexpr std::size_t kTextureViews = 15;
+constexpr float kUmbra =
+    0.1f;  // visible part of the sun up to which, and missing from which, it is clear
 constexpr int kMixed = 2;  // px around a moving object whose colour is mixed
 
 std::vector<Actor> keyActors(const Prepared& p) {
@@ -134,6 +136,10 @@ std::vector<bool> clothAmong(const std::vector<Surface>& surfaces) {
   return cloth;
 }
 
+Eigen::Vector3f lookingDirection(const Prepared& p) {
+  return -p.camera.world_from_camera.linear().col(2).cast<float>();
+}
+
 LightFit lightOf(const std::vector<View>& views, const Background& seen, bool any_moves,
                  const RenderParams& params, const Prepared& p) {
   LightEvidence evidence =
@@ -141,14 +147,44 @@ LightFit lightOf(const std::vector<View>& views, const Background& seen, bool an
   evidence.borders = [&](const Eigen::Vector3f& l) {
     return sunByBorders(views, params.planes, params.depth, l, p.outline_blur);
   };
-  const Eigen::Vector3f view = -p.camera.world_from_camera.linear().col(2).cast<float>();
-  LightFit fit = fitLight(evidence, params.up.cast<float>(), view);
+  LightFit fit = fitLight(evidence, params.up.cast<float>(), lookingDirection(p));
   fit.light.angular_radius = static_cast<float>(params.sun_radius);
   if (fit.by_borders) {
     fit.light.direction = fit.by_borders->direction;
     fit.light.angular_radius = fit.by_borders->radius.value_or(fit.light.angular_radius);
   }
   return fit;
+}
+
+// The light that explains the objects past what else keeps the sun off them.
+LightFit lightPastUnseen(const std::vector<View>& views, const RenderParams& params,
+                         const Prepared& p) {
+  LightEvidence evidence = lightEvidence(views, p.moves, params.planes, {}, params.depth);
+  evidence.known_sun = p.light.light.direction;
+  const auto clear = [&](const LightSample& s) {
+    const float sun = p.unseen_shade.visibility(s.position, s.normal);
+    return sun < kUmbra || sun > 1.0f - kUmbra;
+  };
+  auto& samples = evidence.samples;
+  samples.erase(std::stable_partition(samples.begin(), samples.end(), clear), samples.end());
+  evidence.visible = [&p, past_objects = evidence.visible](const LightSample& s,
+                                                           const Eigen::Vector3f& l) {
+    return past_objects(s, l) * p.unseen_shade.visibility(s.position, s.normal);
+  };
+  LightFit fit = fitLight(evidence, params.up.cast<float>(), lookingDirection(p));
+  if (!fit.determined) return p.light;
+  fit.by_borders = p.light.by_borders;
+  fit.light.angular_radius = p.light.light.angular_radius;
+  return fit;
+}
+
+// Light and objects again once that is known.
+void learnPastUnseen(const std::vector<View>& views, const std::vector<View>& light_views,
+                     const RenderParams& params, Prepared& p) {
+  p.light = lightPastUnseen(light_views, params, p);
+  p.appearances =
+      makeAppearances(views, p.moves, p.light.light, p.light.glosses(clothAmong(p.surfaces)),
+                      params.planes, p.unseen_shade);
 }
 
 // Those that rest, if others move; none if none does, as then all are the same.
@@ -246,6 +282,8 @@ Prepared prepare(const ClipSample& as_taken, const std::vector<ObjectModel>& mod
   if (p.camera_moves && !p.background.drifting.established())
     p.beside = platesBeside(clip.frames(), p.nearness, any_moves, params.background);
   p.background_ms += watch.lap();
+  if (!p.unseen_shade.empty()) learnPastUnseen(views, light_views, params, p);
+  p.appearance_ms += watch.lap();
   p.noise = noiseOf(frames, steadiness, p);
   addRemarks(clip.frames(), actors, p);
   return p;

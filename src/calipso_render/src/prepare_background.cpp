@@ -175,6 +175,15 @@ void addSunless(const cv::Mat& hidden, Prepared& p) {
   if (!hidden.empty()) p.sunless = p.sunless.empty() ? hidden : cv::Mat(cv::max(p.sunless, hidden));
 }
 
+// @param receiver what of the place has the sun
+void takeUnseenCasters(const CastersShade& shade, const ReceiverOf& receiver, Prepared& p) {
+  if (shade.hidden.empty()) return;
+  cv::Mat known = shade.known & (p.shadowless == 0);
+  if (!p.sunless.empty()) known &= p.sunless == 0;  // what is seen hides it there
+  p.unseen_shade = UnseenShade(shade.hidden, known, receiver, p.light.light.direction);
+  addSunless(shade.hidden, p);
+}
+
 // What the objects at rest leave on the place, to be taken out; what of it is mirrored goes to `p`.
 cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& sun,
                    const cv::Mat& sky, const RenderParams& params, Prepared& p) {
@@ -228,7 +237,8 @@ cv::Mat passingTraces(const PlaceEvidence& e, const SeenPlace& place, const Rece
       leaveOutPassingShade(e.frames, cast, receiver, params.background, p.background);
   if (stays.never_lit.empty()) return unfollowedTraces(e, place, sun, sky, params, p);
   if (p.light.confirmed())
-    addSunless(unseenCastersShade(stays.told, p.background.plate, place.surface), p);
+    takeUnseenCasters(unseenCastersShade(stays.told, p.background.plate, place.surface), receiver,
+                      p);
   const SeenShadows shadows = shadowsOn(place, stays.sun, stays.sky, p.background.plate,
                                         p.background.count == 0, p.light.confirmed());
   return shadeTraces(shadows, place, params) & stays.never_lit;
@@ -273,8 +283,8 @@ void findPlaceUmbra(const PlaceEvidence& e, const Haze& haze, const cv::Mat& sun
   } else {
     cv::Mat behind = params.depth.clone();
     if (!behind.empty()) behind.setTo(0.0f, p.key_labels != 0);
-    const auto in_views =
-        umbraInViews(e.views, params.planes, {p.camera, p.background, behind}, light);
+    const auto in_views = umbraInViews(e.views, params.planes, {p.camera, p.background, behind},
+                                       light, p.unseen_shade);
     p.umbra = in_views.umbra ? *in_views.umbra
                              : umbraOfPassing(e.frames, params.planes, p.background, predicted);
     if (in_views.refuted && !p.light.confirmed())  // what moves casts none under this sun
@@ -348,6 +358,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   if (any_rests && !isWater(p.mirror)) liftTraces(e, place, sun, sky, params, traces, p);
   if (any_rests && !p.relief.empty()) traces |= contactTraces(e.actors, e.picture, params, p);
   if (any_moves) traces |= passingTraces(e, place, in_sun, sun, sky, params, p);
+  if (!p.sunless.empty()) sun.setTo(1.0f, p.sunless);
   const cv::Mat ground = groundNearness(params.planes, key.camera, p.scenery);
   if (p.mirror.established())
     takeOffMirrored((ground > 0.0f) & (place.off_planes == 0), traces, key, p);

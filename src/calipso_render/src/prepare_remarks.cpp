@@ -52,6 +52,12 @@ void remarkPlace(const std::vector<ClipFrame>& frames, Prepared& p) {
         "the background drifts, but the frames' stamps do not rise from one to the next: it is "
         "filled as if it did not; give the frames the times at which they were taken");
   }
+  if (!p.unseen_shade.empty())
+    p.remarks.push_back(
+        "something that no frame shows keeps the sun off a part of the place; it is taken to keep "
+        "it "
+        "off objects before that part, too, and before what is not seen as before the nearest "
+        "part");
   if (!p.light.determined)
     p.remarks.push_back(
         "too little of the objects is seen to tell the light; it is assumed high and frontal");

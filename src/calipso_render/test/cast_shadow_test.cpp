@@ -65,7 +65,7 @@ TEST(Umbra, IsToldFromWhatTheViewsObjectsShade) {
     std::vector<View> views = {viewOfShade(surface, -0.1f, camera(), plate.plate),
                                viewOfShade(surface, 0.15f, further, plate.plate)};
     views[0].labels.setTo(kBallLabel);
-    const auto found = umbraInViews(views, table(), place, sunlight()).umbra;
+    const auto found = umbraInViews(views, table(), place, sunlight(), UnseenShade()).umbra;
     ASSERT_TRUE(found);
     for (int c = 0; c < 3; ++c)
       EXPECT_NEAR((*found)[c], kUmbra[c], 0.03f) << c;  // the maps have other resolutions
@@ -73,9 +73,23 @@ TEST(Umbra, IsToldFromWhatTheViewsObjectsShade) {
   const View unshaded_view{plate.plate, cv::Mat::zeros(kHeight, kWidth, CV_8U), camera(),
                            viewOfShade(surface, -0.1f, camera(), plate.plate).actors};
   // No shadow where one is predicted.
-  const SeenUmbra none = umbraInViews({unshaded_view, unshaded_view}, table(), place, sunlight());
+  const SeenUmbra none =
+      umbraInViews({unshaded_view, unshaded_view}, table(), place, sunlight(), UnseenShade());
   EXPECT_FALSE(none.umbra);
   EXPECT_TRUE(none.refuted);
+  // Unless something else keeps the sun off the place anyhow.
+  const cv::Mat all(kHeight, kWidth, CV_8U, cv::Scalar(255));
+  cv::Mat left = all.clone();
+  left.colRange(kWidth / 2, kWidth).setTo(0);
+  const UnseenShade unseen(
+      left, all, [](int u, int v) { return receiverAt(table(), camera(), u, v); },
+      sunlight().direction);
+  const View shaded_view = viewOfShade(surface, 0.15f, camera(), plate.plate);
+  const auto right =
+      umbraInViews({unshaded_view, unshaded_view, unshaded_view, shaded_view, shaded_view}, table(),
+                   place, sunlight(), unseen);
+  ASSERT_TRUE(right.umbra);
+  EXPECT_NEAR((*right.umbra)[1], kUmbra[1], 0.03f);
 }
 
 // All colours tell a shadow, or none: one alone would tint it.

@@ -28,7 +28,7 @@ class UnseenCasters : public ::testing::Test {
   }
 
   int hiddenAt(int u, int v) const {
-    return unseenCastersShade(told, plate, surface).at<std::uint8_t>(v, u);
+    return unseenCastersShade(told, plate, surface).hidden.at<std::uint8_t>(v, u);
   }
 
   cv::Mat plate, surface, told;
@@ -42,6 +42,31 @@ TEST_F(UnseenCasters, ShadeWhereAPassingShadowDarkensNothingAndWhatIsAsDark) {
   EXPECT_EQ(hiddenAt(40, 160), 0);  // of the floor nothing is known
 }
 
+// The wall tells how dark its shade is.
+TEST_F(UnseenCasters, ShadeAnotherSurfaceOfWhichTheLitPartIsToldAlone) {
+  told(cv::Rect(140, kFloor + 10, 90, 40)) = kSun;
+  EXPECT_EQ(hiddenAt(40, 160), 255);
+  EXPECT_EQ(hiddenAt(120, 160), 0);
+  // what is as dark as that, but of another hue, is no shade
+  cv::Mat floor = plate.rowRange(kFloor, 180).colRange(0, kEdge);
+  cv::multiply(floor, cv::Scalar(1.5, 1.0, 0.7), floor);
+  EXPECT_EQ(hiddenAt(40, 160), 0);
+}
+
+// Light that grows over 20 px.
+TEST_F(UnseenCasters, ShadeSoftlyAsTheBrightnessHasIt) {
+  for (int u = 0; u < 240; ++u) {
+    const double lit = std::clamp((u - kEdge + 10) / 20.0, 0.0, 1.0),
+                 code = std::pow((0.22 + 0.78 * lit), 1.0 / 2.2);
+    plate.col(u) *= u < kEdge ? 2.0 * code : code;
+  }
+  EXPECT_NEAR(hiddenAt(kEdge, 100), 128, 25);
+  EXPECT_NEAR(hiddenAt(kEdge - 6, 100), 204, 30);
+  EXPECT_NEAR(hiddenAt(kEdge + 6, 100), 51, 30);
+  EXPECT_GT(hiddenAt(kEdge - 20, 100), 245);
+  EXPECT_LT(hiddenAt(kEdge + 20, 100), 10);
+}
+
 TEST_F(UnseenCasters, AreNotSoughtByBrightnessThatDoesNotTell) {
   plate.colRange(0, kEdge) *= 2.0;
   EXPECT_EQ(hiddenAt(40, 30), 255);
@@ -50,7 +75,7 @@ TEST_F(UnseenCasters, AreNotSoughtByBrightnessThatDoesNotTell) {
 
 TEST_F(UnseenCasters, AreNoneWhereAllShadowsDarken) {
   told.setTo(kSun, told == kNoSun);
-  EXPECT_TRUE(unseenCastersShade(told, plate, surface).empty());
+  EXPECT_TRUE(unseenCastersShade(told, plate, surface).hidden.empty());
 }
 
 // With a quarter left in the shade and half the sun hidden, 0.625 are seen: 0.4 of it are 0.25.

@@ -259,7 +259,7 @@ class Evaluation {
       views[0].actors.push_back(makeActor(s, s.key_vertices, scene_.camera));
     std::vector<Gloss> glosses;
     for (const Appearance& a : p.appearances) glosses.push_back(a.gloss);
-    return makeAppearances(views, p.moves, p.light.light, glosses, params_.planes);
+    return makeAppearances(views, p.moves, p.light.light, glosses, params_.planes, p.unseen_shade);
   }
 
   std::shared_ptr<Prepared> fromKeyFrame() const {

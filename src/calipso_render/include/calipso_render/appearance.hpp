@@ -6,6 +6,7 @@
 #include "calipso_render/light.hpp"
 #include "calipso_render/stage.hpp"
 #include "calipso_render/surface_texture.hpp"
+#include "calipso_render/unseen_shade.hpp"
 
 namespace calipso::render {
 
@@ -52,11 +53,12 @@ class Appearance {
 inline cv::Vec3f lightFloor(const cv::Vec3f& mean_light) { return mean_light * 0.05f; }
 
 // @param views the key frame, then frames in which the objects that `moves` names are seen from
-// other sides; planes: those that they mirror from below
+// other sides; planes: those that they mirror from below; unseen: keeps the sun off them
 std::vector<Appearance> makeAppearances(const std::vector<View>& views,
                                         const std::vector<bool>& moves, const Light& light,
                                         const std::vector<Gloss>& glosses,
-                                        const std::vector<SupportPlane>& planes = {});
+                                        const std::vector<SupportPlane>& planes = {},
+                                        const UnseenShade& unseen = {});
 
 // Bicubic (Catmull-Rom) lookup with borders repeated, not below 0. (u, v) in the image's own
 // pixels.

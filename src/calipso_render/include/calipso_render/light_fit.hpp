@@ -66,12 +66,13 @@ struct LightEvidence {
   // was seen; may be empty.
   std::function<double(const Eigen::Vector3f& l)> shadow_misfit;
   std::vector<Eigen::Vector3f> shadow_candidates;  // directions that cast shadows speak for
+  std::optional<Eigen::Vector3f> known_sun;        // the sun's direction, if it need not be found
   // Where borders of cast shadows put a sun that is nearly in direction l; may be empty, and tell
   // nothing.
   std::function<std::optional<SunByBorders>(const Eigen::Vector3f& l)> borders;
-  // Gloss from the pixels near the mirror direction, in the clusters of the samples nearest to them,
-  // under a light found; may be empty, and find none.
-  std::function<SeenGlosses(const LightFit&, const std::vector<LightSample>&)> gloss;
+  // Gloss from the pixels near the mirror direction, in the clusters of the evidence's samples nearest
+  // to them, under a light found; may be empty, and find none.
+  std::function<SeenGlosses(const LightFit&, const LightEvidence&)> gloss;
 };
 
 // What views, one or several, show. @param plate what was seen of the place without the objects,

@@ -15,6 +15,7 @@
 #include "calipso_render/plane_mirror.hpp"
 #include "calipso_render/relief.hpp"
 #include "calipso_render/stage.hpp"
+#include "calipso_render/unseen_shade.hpp"
 
 namespace calipso::render {
 
@@ -108,7 +109,8 @@ struct Prepared {
   // CV_8UC1: lightLevel() of the sun below which no shade brings a place, as scenery stands before it
   // anyhow, or something that is not seen, or a wall turns away from it; may be empty
   cv::Mat sunless;
-  Relief relief;     // of the place, takes shadows; may be empty
+  UnseenShade unseen_shade;  // under the video's sun
+  Relief relief;             // of the place, takes shadows; may be empty
   cv::Mat veil;      // CV_8UC1: part of what the place shows that haze adds, 255 all; may be empty
   cv::Mat nearness;  // CV_32FC1, 1/m: of the place without the objects, 0 infinitely far
   PlaneMirror mirror;

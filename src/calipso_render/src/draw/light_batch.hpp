@@ -32,4 +32,12 @@ class LightBatch {
   int count_ = 0;
 };
 
+// Takes from the visible part of a light what another thing hides of it.
+inline void multiplyBy(const Visibility& light, const LightBatch& points, float* visible) {
+  if (light.empty()) return;
+  float more[LightBatch::kMost];
+  points.look(light, more);
+  for (int k = 0; k < points.count(); ++k) visible[k] *= more[k];
+}
+
 }  // namespace calipso::render

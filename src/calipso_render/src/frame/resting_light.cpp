@@ -85,7 +85,7 @@ void RestingLight::measureOthers(const StagedFrame& frame, const SeenPlace& plac
     return bounds.empty() ? cv::Mat() : sunLevels(frame, place, sun, bounds, nullptr);
   };
   const Light& of_video = frame.prepared.light.light;
-  const bool as_in_video = frame.light.direction == of_video.direction;
+  const bool as_in_video = frame.hasSunOfVideo();
   others_sun_ = levels(*others_, frame.light);
   others_sun_in_video_ =
       as_in_video ? others_sun_ : levels(*sunVisibility(others, of_video, frame.params), of_video);

@@ -89,7 +89,9 @@ void ShadedOthers::shade(const VisibilityBuffer& seen, int u, int v, Pixel& pixe
   if (before - now < kSameShadow &&
       (now - before < kSameShadow || !frame_.prepared.light.confirmed()))
     return;
-  const float others = resting_.others().visibility(p->position, p->normal);
+  float others = resting_.others().visibility(p->position, p->normal);
+  if (frame_.hasSunOfVideo())
+    others *= frame_.prepared.unseen_shade.visibility(p->position, p->normal);
   const cv::Vec3f back = cv::Vec3f::all(kThrownBack);
   const cv::Vec3f was = diffuseShading(frame_.light, p->normal, others * before, p->seen, back),
                   is = diffuseShading(frame_.light, p->normal, others * now, p->seen, back);

@@ -71,6 +71,7 @@ struct StagedFrame {
   bool isSeenAt(int surface, const Points& vertices) const;
   // Whether any edited object moves in the video.
   bool movesInVideo() const;
+  bool hasSunOfVideo() const { return light.direction == prepared.light.light.direction; }
   // Whether an object is edited, and its shade, and what its mask misses, no longer the video's.
   bool casts(std::size_t surface) const { return edited[surface] && !follows[surface]; }
 

@@ -159,13 +159,11 @@ std::optional<float> SurfaceSun::between(float u, float v, float nearness, int s
   return between(&Corner::sun);
 }
 
-// What edited objects and others leave of the sun.
+// What edited objects, others and what no frame shows leave of the sun.
 void SurfaceSun::lookAt(const LightBatch& points, float* sun) const {
   points.look(*moved_.sun, sun);
-  if (resting_.others().empty()) return;
-  float others[LightBatch::kMost];
-  points.look(resting_.others(), others);
-  for (int k = 0; k < points.count(); ++k) sun[k] *= others[k];
+  multiplyBy(resting_.others(), points, sun);
+  if (frame_.hasSunOfVideo()) multiplyBy(frame_.prepared.unseen_shade, points, sun);
 }
 
 void SurfaceSun::onPlaces(const int* places, int count, const float* nearness,

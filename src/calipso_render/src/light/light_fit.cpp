@@ -258,6 +258,11 @@ LightEvidence withoutShadows(LightEvidence evidence) {
 // Light, albedos and gloss from shading and cast shadows.
 LightFit fitShading(const LightEvidence& evidence, const Eigen::Vector3f& up) {
   LightFit best;
+  if (evidence.known_sun) {
+    best.from_shadows = true;
+    keepBetter(fitFrom(lightFrom(*evidence.known_sun, evidence, up), evidence, up, false), best);
+    return best;
+  }
   std::vector<LightCandidate> starts = searchLight(evidence, up, kStarts);
   best.from_shadows = shadowsTell(evidence, starts.front(), up);
   if (!best.from_shadows) starts = searchLight(withoutShadows(evidence), up, kStarts);
@@ -350,7 +355,7 @@ LightFit fitLight(const LightEvidence& seen, const Eigen::Vector3f& up,
     if (!fit.determined) break;
     best = fit, evidence = apart;
   }
-  if (evidence.gloss) best.seen_gloss = evidence.gloss(best, evidence.samples);
+  if (evidence.gloss) best.seen_gloss = evidence.gloss(best, evidence);
   if (best.seen_gloss.of_all) best.gloss = best.seen_gloss.of_all->gloss;
   best.gloss.around = surroundingsStrength(evidence, best);
   best.second_order = refineAmbient(evidence, best);

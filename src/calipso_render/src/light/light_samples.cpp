@@ -236,10 +236,10 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
     return seen->objects[s.picture].blocked(s.position, s.normal, l) ? 0.0f : 1.0f;
   };
   addShadows(seen, evidence);
-  evidence.gloss = [&views, anew = shownAnew(views, moves), visible = evidence.visible](
-                       const LightFit& fit, const std::vector<LightSample>& samples) {
-    return seenGlosses(highlightSamples(views, anew, samples, fit.light.direction), anew.size(),
-                       fit, visible);
+  evidence.gloss = [&views, anew = shownAnew(views, moves)](const LightFit& fit,
+                                                            const LightEvidence& all) {
+    return seenGlosses(highlightSamples(views, anew, all.samples, fit.light.direction), anew.size(),
+                       fit, all.visible);
   };
   return evidence;
 }

@@ -231,6 +231,11 @@ std::vector<Eigen::Vector3f> directionsOf(const std::vector<LightCandidate>& can
 
 }  // namespace
 
+LightCandidate lightFrom(const Eigen::Vector3f& to_sun, const LightEvidence& evidence,
+                         const Eigen::Vector3f& up) {
+  return Search(evidence, up).byShading(to_sun, evidence.visible);
+}
+
 std::vector<LightCandidate> searchLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
                                         std::size_t count) {
   const Search search(evidence, up);

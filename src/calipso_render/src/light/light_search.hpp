@@ -23,6 +23,10 @@ struct LightCandidate {
 std::vector<LightCandidate> searchLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
                                         std::size_t count);
 
+// The light of a sun in a direction that is known.
+LightCandidate lightFrom(const Eigen::Vector3f& to_sun, const LightEvidence& evidence,
+                         const Eigen::Vector3f& up);
+
 // Ambient light's assumed profile, where what lies below is grey: 1 + kSkyGradient n.up.
 inline constexpr float kSkyGradient = 0.45f;
 

@@ -14,6 +14,7 @@ namespace {
 constexpr int kStride = 2;           // px between the places that are looked at
 constexpr int kBeside = 5;           // px beside an object's mask that may show it
 constexpr float kFullShade = 0.05f;  // of the sun
+constexpr float kFullSun = 0.9f;     // but for the objects
 constexpr float kOpenSky = 0.4f;     // less of it is seen along contacts, where the dark is another
 constexpr float kDark = 0.01f;       // linear; what is darker says nothing of its shadow
 constexpr std::size_t kFewest = 100;
@@ -21,7 +22,7 @@ constexpr float kNoShadow = 0.85f;  // hardly darker: the shadow was not where i
 
 // Picture over plate in the full shade of one view.
 void collect(const View& view, const std::vector<SupportPlane>& planes, const EmptyPlace& place,
-             const Light& light, std::vector<float> (&ratios)[3]) {
+             const Light& light, const Visibility& unseen, std::vector<float> (&ratios)[3]) {
   const std::vector<Occluder> occluders = occludersOf(view.actors);
   const ShadowMap sun(occluders, light.direction.cast<double>(), {512, light.angular_radius, 16});
   const SkyMap sky(occluders, planes.front().normal, {});
@@ -33,7 +34,8 @@ void collect(const View& view, const std::vector<SupportPlane>& planes, const Em
   for (int v = 0; v < covered.rows; v += kStride) {
     for (int u = 0; u < covered.cols; u += kStride) {
       if (covered.at<std::uint8_t>(v, u) != 0 || !seen.at(u, v, r) ||
-          sun.visibility(r.position, r.normal) > kFullShade)
+          sun.visibility(r.position, r.normal) > kFullShade ||
+          unseen.visibility(r.position, r.normal) < kFullSun)
         continue;
       const auto lit_code = unshaded(place, camera_from_world, r.position);
       const float open = sky.visibility(r.position, r.normal);
@@ -49,10 +51,10 @@ void collect(const View& view, const std::vector<SupportPlane>& planes, const Em
 }  // namespace
 
 SeenUmbra umbraInViews(const std::vector<View>& views, const std::vector<SupportPlane>& planes,
-                       const EmptyPlace& place, const Light& light) {
+                       const EmptyPlace& place, const Light& light, const Visibility& unseen) {
   if (planes.empty()) return {};
   std::vector<float> ratios[3];
-  for (const View& view : views) collect(view, planes, place, light, ratios);
+  for (const View& view : views) collect(view, planes, place, light, unseen, ratios);
   cv::Vec3f umbra;
   int undarkened = 0;
   for (int c = 0; c < 3; ++c) {

@@ -17,9 +17,9 @@ struct SeenUmbra {
 
 // What the sun's absence leaves of a support plane's brightness, from the places that the views'
 // objects are known to shade: the median of picture over plate, what the objects hide of the sky
-// taken off.
+// taken off. @param unseen what else keeps the sun off them
 SeenUmbra umbraInViews(const std::vector<View>& views, const std::vector<SupportPlane>& planes,
-                       const EmptyPlace& place, const Light& light);
+                       const EmptyPlace& place, const Light& light, const Visibility& unseen);
 
 // What the light itself says of that, on the first plane.
 cv::Vec3f predictedUmbra(const Light& light, const std::vector<SupportPlane>& planes);

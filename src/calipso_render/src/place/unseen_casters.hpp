@@ -14,8 +14,11 @@ constexpr std::uint8_t kSunUntold = 0, kNoSun = 1, kSun = 2;
 // dark as that, if brightness tells the two apart there.
 // @param told what passing shade tells @param plate CV_32FC3, code values
 // @param surface CV_8UC1, from 1 on; may be empty: nothing is inferred for more than what was told
-// @return CV_8UC1: hidden part of the sun, 255 all; empty: nowhere
-cv::Mat unseenCastersShade(const cv::Mat& told, const cv::Mat& plate, const cv::Mat& surface);
+struct CastersShade {
+  cv::Mat hidden;  // CV_8UC1: hidden part of the sun, 255 all; empty: nowhere
+  cv::Mat known;   // CV_8UC1: 255 where the place tells it
+};
+CastersShade unseenCastersShade(const cv::Mat& told, const cv::Mat& plate, const cv::Mat& surface);
 
 // CV_8UC1: lightLevel() of the sun below which no shade brings a place that part of the sun is hidden
 // from anyhow. @param umbra what the sun's absence leaves of its brightness

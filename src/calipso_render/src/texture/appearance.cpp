@@ -47,6 +47,7 @@ struct Shade {
   ShadowMap sun;
   SkyMap sky;
   const std::vector<SupportPlane>* planes;
+  const UnseenShade* unseen;
 };
 
 // Light on one actor's visible surface, pixel by pixel.
@@ -63,14 +64,15 @@ struct Shaded {
 };
 
 // Visible part of the sun at each point.
-std::vector<float> sunAt(const std::vector<SurfacePoint>& points, const ShadowMap& sun) {
+std::vector<float> sunAt(const std::vector<SurfacePoint>& points, const Shade& shade) {
   std::vector<float> visible;
   LightBatch batch;
   float some[LightBatch::kMost];
   for (const SurfacePoint& p : points) {
     batch.add(p.position, p.normal);
     if (batch.count() < LightBatch::kMost && &p != &points.back()) continue;
-    batch.look(sun, some);
+    batch.look(shade.sun, some);
+    multiplyBy(*shade.unseen, batch, some);
     visible.insert(visible.end(), some, some + batch.count());
     batch.clear();
   }
@@ -80,7 +82,7 @@ std::vector<float> sunAt(const std::vector<SurfacePoint>& points, const ShadowMa
 Shaded lightOn(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light,
                const Gloss& gloss, const Shade& shade, const cv::Vec3f& thrown_back) {
   Shaded s;
-  const ShadedGround ground(*shade.planes, light, {&shade.sun}, shade.sky);
+  const ShadedGround ground(*shade.planes, light, {&shade.sun, shade.unseen}, shade.sky);
   for (cv::Mat* colours : {&s.highlight, &s.light, &s.open, &s.normal})
     *colours = cv::Mat::zeros(region.size(), CV_32FC3);
   for (cv::Mat* values : {&s.glint, &s.nearness, &s.sky})
@@ -101,7 +103,7 @@ Shaded lightOn(const Actor& actor, const cv::Rect& region, const Camera& camera,
       points.push_back(
           surfacePoint(actor, VisibilityBuffer::triangleOf(id), u + region.x, v + region.y, eye));
     }
-    const std::vector<float> sun = sunAt(points, shade.sun);
+    const std::vector<float> sun = sunAt(points, shade);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const int u = columns[i];
       const SurfacePoint& p = points[i];
@@ -215,7 +217,8 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   return r;
 }
 
-Shade shadeIn(const View& view, const Light& light, const std::vector<SupportPlane>& planes) {
+Shade shadeIn(const View& view, const Light& light, const std::vector<SupportPlane>& planes,
+              const UnseenShade& unseen) {
   std::vector<Occluder> occluders;
   for (const Actor& a : view.actors)
     occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
@@ -223,7 +226,7 @@ Shade shadeIn(const View& view, const Light& light, const std::vector<SupportPla
                 {kShadowMapSide, light.angular_radius, 16});
   if (planes.empty()) occluders.clear();
   const Eigen::Vector3d up = planes.empty() ? Eigen::Vector3d::UnitZ() : planes.front().normal;
-  return {std::move(sun), SkyMap(occluders, up, SkyMap::Params()), &planes};
+  return {std::move(sun), SkyMap(occluders, up, SkyMap::Params()), &planes, &unseen};
 }
 
 cv::Vec3f meanReflectance(const Reflectance& r) {
@@ -312,18 +315,19 @@ class Portrait {
 std::vector<Appearance> makeAppearances(const std::vector<View>& views,
                                         const std::vector<bool>& moves, const Light& light,
                                         const std::vector<Gloss>& glosses,
-                                        const std::vector<SupportPlane>& planes) {
+                                        const std::vector<SupportPlane>& planes,
+                                        const UnseenShade& unseen) {
   std::vector<Portrait> portraits;
   const std::vector<bool> anew = shownAnew(views, moves);
   for (std::size_t i = 0; i < moves.size(); ++i)
     portraits.emplace_back(views, i, anew[i], light, glosses[i]);
-  const Shade key_shade = shadeIn(views[0], light, planes);
+  const Shade key_shade = shadeIn(views[0], light, planes, unseen);
 #pragma omp parallel for schedule(dynamic, 1) if (moves.size() > 1)
   for (std::size_t i = 0; i < moves.size(); ++i) portraits[i].seeKey(key_shade);
   if (std::find(anew.begin(), anew.end(), true) != anew.end()) {
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t k = 1; k < views.size(); ++k) {
-      const Shade shade = shadeIn(views[k], light, planes);
+      const Shade shade = shadeIn(views[k], light, planes, unseen);
       for (Portrait& p : portraits) p.seeFurther(k, shade);
     }
   }
