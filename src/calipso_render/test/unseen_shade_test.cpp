@@ -140,5 +140,69 @@ TEST(Renderer, DrawsWhatHasMovedIntoTheShadeOfWhatIsNotSeenInIt) {
             0.0);
 }
 
+constexpr double kKeyX = 0.03;
+
+// The ball flies across the border of the shade, in which its own leaves no trace.
+ClipSample flightAcrossBorder() {
+  const Eigen::Vector3f l = sunlight().direction;
+  ClipSample clip;
+  for (int i = 0; i < 16; ++i) {
+    const Eigen::Vector3d centre(i == 0 ? kKeyX : -0.2 + 0.03 * i, 0.1, 0.2);
+    ClipFrame f = frameInShade(centre);
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        const auto r = tableAt(u, v);
+        if (f.labels.at<std::uint8_t>(v, u) != 0 || !r) continue;
+        const Eigen::Vector3f way = centre.cast<float>() - r->position;
+        const bool in_shadow = (way - way.dot(l) * l).norm() < kBallRadius;
+        const bool dark = in_shadow || r->position.x() < kEdge;
+        f.bgr.at<cv::Vec3b>(v, u) = (dark ? 0.55 : 1.0) * cv::Vec3d(120.0, 140.0, 160.0);
+      }
+    }
+    ObjectPose pose{kBallLabel};
+    pose.world_from_object.translation() = centre;
+    f.poses = {pose}, f.stamp_ns = i;
+    clip.add(f);
+  }
+  return clip;
+}
+
+cv::Mat depthOfTable() {
+  cv::Mat depth = cv::Mat::zeros(kHeight, kWidth, CV_32F);
+  const Eigen::Isometry3d camera_from_world = camera().world_from_camera.inverse();
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      if (const auto r = tableAt(u, v))
+        depth.at<float>(v, u) =
+            static_cast<float>((camera_from_world * r->position.cast<double>()).z());
+    }
+  }
+  return depth;
+}
+
+TEST(Prepare, LearnsAnObjectPastWhatKeepsTheSunOffIt) {
+  RenderParams exact = params();
+  exact.background.shadow_margin_px = 2;  // the ball's shadow is small
+  exact.depth = depthOfTable();
+  const Prepared p = prepare(flightAcrossBorder(), {ballAt({kKeyX, 0.1, 0.2})}, exact);
+  ASSERT_TRUE(p.light.confirmed());
+  ASSERT_FALSE(p.unseen_shade.empty());
+  EXPECT_LT(sunAt(p.unseen_shade, {-0.2f, 0.1f, 0.1f}), 0.1f);
+  EXPECT_GT(sunAt(p.unseen_shade, {0.2f, 0.1f, 0.1f}), 0.9f);
+  const Actor ball = makeActor(p.surfaces[0], p.surfaces[0].key_vertices, camera());
+  double dark = 0.0, lit = 0.0;
+  int darks = 0, lits = 0;
+  const Appearance& a = p.appearances[0];
+  forEachPixelOf(ball, [&](int u, int v, const SurfacePoint& at) {
+    if (at.normal.dot(sunlight().direction) < 0.3f) return;
+    const float albedo = a.albedo.at<cv::Vec4f>(v - a.region.y, u - a.region.x)[2],
+                x = landingOf(at.position).x() - kEdge;
+    if (x < -0.02f) dark += albedo, ++darks;
+    if (x > 0.02f) lit += albedo, ++lits;
+  });
+  ASSERT_GT(std::min(darks, lits), 100);
+  EXPECT_NEAR(dark / darks, lit / lits, 0.15 * lit / lits);  // half as bright in the shade
+}
+
 }  // namespace
 }  // namespace calipso::render
