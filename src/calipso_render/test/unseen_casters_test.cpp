@@ -73,6 +73,22 @@ TEST_F(UnseenCasters, AreNotSoughtByBrightnessThatDoesNotTell) {
   EXPECT_EQ(hiddenAt(40, 100), 0);
 }
 
+// No shade shows on what is clipped: none is drawn there, but that tells nothing of the sun.
+TEST_F(UnseenCasters, AreNotKnownWhereThePictureIsClipped) {
+  EXPECT_EQ(unseenCastersShade(told, plate, surface).known.at<std::uint8_t>(100, 40), 255);
+  plate.colRange(0, kEdge).setTo(255.0);
+  const CastersShade shade = unseenCastersShade(told, plate, surface);
+  EXPECT_EQ(shade.hidden.at<std::uint8_t>(30, 40), 255);
+  EXPECT_EQ(cv::countNonZero(shade.known), 0);
+}
+
+// Nor where no surface has both, and brightness does not bear out what passing shade told.
+TEST_F(UnseenCasters, AreNotKnownBesideSurfacesThatHaveBoth) {
+  const CastersShade shade = unseenCastersShade(told, plate, {});
+  EXPECT_EQ(shade.hidden.at<std::uint8_t>(30, 40), 255);
+  EXPECT_EQ(cv::countNonZero(shade.known), 0);
+}
+
 TEST_F(UnseenCasters, AreNoneWhereAllShadowsDarken) {
   told.setTo(kSun, told == kNoSun);
   EXPECT_TRUE(unseenCastersShade(told, plate, surface).hidden.empty());

@@ -12,7 +12,8 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kFewest = 200;     // px of either kind
+constexpr int kFewest = 200;                           // px of either kind
+constexpr double kBlackest = 8.0, kBrightest = 250.0;  // code values between which shade shows
 constexpr int kAround = 9;       // px of the square over which verdicts and brightness are averaged
 constexpr float kMost = 0.25;    // part of it that must be told
 constexpr double kApart = 0.35;  // log brightness between what has the sun and what has not
@@ -88,9 +89,13 @@ class Surfaces {
         dark_(clearly(told, kNoSun, kSun)),
         lit_(clearly(told, kSun, kNoSun)),
         brightness_(luminanceOf(plate)),
-        shade_{{}, dark_ | lit_} {
+        shade_{{}, cv::Mat::zeros(told.size(), CV_8U)} {
     cv::GaussianBlur(dark_, shade_.hidden, {}, kPenumbra);
     cv::extractChannel(plate, blue_, 0), cv::extractChannel(plate, red_, 2);
+    const cv::Mat most = cv::max(cv::max(blue_, red_), brightness_);
+    clipped_ = (most > kBrightest) | (most < kBlackest);
+    shade_.hidden.copyTo(hidden_clipped_, clipped_);
+    dark_.setTo(0, clipped_);
   }
 
   CastersShade find() {
@@ -105,6 +110,8 @@ class Surfaces {
       if (!darks && lits) lit_alone.push_back(k);
     }
     for (const int k : lit_alone) judgeByOthers(surface_ == k);
+    shade_.hidden = cv::max(shade_.hidden, hidden_clipped_);
+    shade_.known.setTo(0, clipped_);
     return shade_;
   }
 
@@ -181,6 +188,8 @@ class Surfaces {
   const cv::Mat& surface_;
   cv::Mat linear_;  // luminance
   cv::Mat dark_, lit_, brightness_, blue_, red_;
+  // what is clipped or black shows no shade, whatever reaches it
+  cv::Mat clipped_, hidden_clipped_;
   CastersShade shade_;
   std::vector<Tones> others_;  // of surfaces where both were told
 };

@@ -16,7 +16,7 @@ constexpr std::uint8_t kSunUntold = 0, kNoSun = 1, kSun = 2;
 // @param surface CV_8UC1, from 1 on; may be empty: nothing is inferred for more than what was told
 struct CastersShade {
   cv::Mat hidden;  // CV_8UC1: hidden part of the sun, 255 all; empty: nowhere
-  cv::Mat known;   // CV_8UC1: 255 where the place tells it
+  cv::Mat known;   // CV_8UC1: 255 on surfaces on which the sun and its absence are told apart
 };
 CastersShade unseenCastersShade(const cv::Mat& told, const cv::Mat& plate, const cv::Mat& surface);
 
