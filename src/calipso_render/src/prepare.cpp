@@ -10,6 +10,7 @@
 #include "frame/edge_blur.hpp"
 #include "light/shadow_borders.hpp"
 #include "model_details.hpp"
+#include "place/blank_frames.hpp"
 #include "place/clip_motion.hpp"
 #include "place/exposure.hpp"
 #include "place/key_cover.hpp"
@@ -228,9 +229,11 @@ NoiseModel noiseOf(const std::vector<ClipFrame>& frames, const cv::Mat& steadine
 
 }  // namespace
 
-Prepared prepare(const ClipSample& as_taken, const std::vector<ObjectModel>& models,
+Prepared prepare(const ClipSample& given_clip, const std::vector<ObjectModel>& models,
                  const RenderParams& given) {
-  checkInput(as_taken, given);
+  checkInput(given_clip, given);
+  const std::optional<ClipSample> without_blanks = withoutBlankFrames(given_clip);
+  const ClipSample& as_taken = without_blanks ? *without_blanks : given_clip;
   const std::optional<ClipSample> even = evenlyExposed(as_taken);
   const ClipSample& clip = even ? *even : as_taken;
   RenderParams params = given;
@@ -285,6 +288,7 @@ Prepared prepare(const ClipSample& as_taken, const std::vector<ObjectModel>& mod
   if (!p.unseen_shade.empty()) learnPastUnseen(views, light_views, params, p);
   p.appearance_ms += watch.lap();
   p.noise = noiseOf(frames, steadiness, p);
+  p.blank_frames = static_cast<int>(given_clip.frames().size() - clip.frames().size());
   addRemarks(clip.frames(), actors, p);
   return p;
 }

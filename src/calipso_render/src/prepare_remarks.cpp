@@ -52,6 +52,10 @@ void remarkPlace(const std::vector<ClipFrame>& frames, Prepared& p) {
         "the background drifts, but the frames' stamps do not rise from one to the next: it is "
         "filled as if it did not; give the frames the times at which they were taken");
   }
+  if (p.blank_frames > 0)
+    p.remarks.push_back(std::to_string(p.blank_frames) + " of " +
+                        std::to_string(p.blank_frames + frames.size()) +
+                        " frames are mostly white or black: nothing was learnt from them");
   if (!p.unseen_shade.empty())
     p.remarks.push_back(
         "something that no frame shows keeps the sun off a part of the place; it is taken to keep "

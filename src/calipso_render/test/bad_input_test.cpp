@@ -79,6 +79,22 @@ TEST(BadInput, SaturatedAndBlackPictures) {
   }
 }
 
+// A flash would be the place in a brighter light.
+TEST(BadInput, SomeWhiteFrames) {
+  const ClipFrame key = frameWithBall(ballAt(kCentre));
+  ClipSample clip;
+  for (int k = 0; k < 12; ++k) {
+    ClipFrame frame = k == 0 ? key : frameWithBall(ballAt(kCentre + Eigen::Vector3d(0.3, 0, 0)));
+    if (k % 3 == 2) frame.bgr.setTo(cv::Scalar::all(255));
+    clip.add(frame);
+  }
+  const Prepared p = prepare(clip, {ballAt(kCentre)}, params());
+  EXPECT_TRUE(says(p, "4 of 12 frames are mostly white or black"));
+  for (const cv::Point at : {cv::Point(20, 100), cv::Point(80, 55)})  // beside the ball, behind it
+    EXPECT_NEAR(p.background.plate.at<cv::Vec3f>(at)[1], tableColour(at.x, at.y)[1], 2.0f);
+  expectFrame(p, key);
+}
+
 TEST(BadInput, AMeshWithoutItsVisibleSide) {
   const ClipFrame key = frameWithBall(ballAt(kCentre));
   ObjectModel model = ballAt(kCentre);

@@ -122,6 +122,7 @@ struct Prepared {
   NoiseModel noise;
   float outline_blur = 0.0f;  // px: how much softer than a pixel the video's outlines are,
   float colour_blur = 0.0f;   // ... their colours beside their brightness
+  int blank_frames = 0;  // of the clip, which nothing was learnt from
   int light_views = 1, texture_views = 1;  // frames that light and texture come from
   double background_ms = 0.0,
          appearance_ms = 0.0;        // wall time that plate, and light with appearances, took
