@@ -55,7 +55,8 @@ void remarkPlace(const std::vector<ClipFrame>& frames, Prepared& p) {
   if (p.blank_frames > 0)
     p.remarks.push_back(std::to_string(p.blank_frames) + " of " +
                         std::to_string(p.blank_frames + frames.size()) +
-                        " frames are mostly white or black: nothing was learnt from them");
+                        " frames are mostly white or black: nothing was learnt from them, and they "
+                        "are left as they are");
   if (!p.unseen_shade.empty())
     p.remarks.push_back(
         "something that no frame shows keeps the sun off a part of the place; it is taken to keep "

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "frame/frame_compositor.hpp"
+#include "place/blank_frames.hpp"
 #include "place/exposure.hpp"
 #include "place/view_warp.hpp"
 
@@ -40,6 +41,10 @@ Appearance plainAppearance(const Surface& surface, const Camera& camera) {
   plain.mean_light = cv::Vec3f(1.0f, 1.0f, 1.0f);
   plain.findSources();
   return plain;
+}
+
+FrameOutput unedited(const FrameInput& frame) {
+  return {frame.bgr.clone(), cv::Mat::zeros(frame.bgr.size(), CV_8U)};
 }
 
 }  // namespace
@@ -79,7 +84,7 @@ void Renderer::addNewcomers(const FrameInput& frame) {
 FrameOutput Renderer::composite(const FrameInput& frame) {
   const bool touched = std::any_of(frame.objects.begin(), frame.objects.end(),
                                    [](const ObjectInFrame& o) { return o.edited || o.removed; });
-  if (!touched) return {frame.bgr.clone(), cv::Mat::zeros(frame.bgr.size(), CV_8U)};
+  if (!touched) return unedited(frame);
   const cv::Size expected(prepared_->camera.width, prepared_->camera.height);
   if (!frame.labels.empty() && frame.labels.size() != frame.bgr.size())
     throw std::invalid_argument("segmentation and frame differ in size");
@@ -89,6 +94,7 @@ FrameOutput Renderer::composite(const FrameInput& frame) {
                                 std::to_string(expected.width) + " x " +
                                 std::to_string(expected.height) + "; play both at one size");
   }
+  if (isBlankAgainst(frame.bgr, prepared_->background.plate)) return unedited(frame);
   addNewcomers(frame);
   if (!prepared_->camera_moves && sameView(prepared_->camera, frame.camera)) {
     const cv::Mat& labels = frame.labels.empty() ? prepared_->key_labels : frame.labels;

@@ -93,6 +93,17 @@ TEST(BadInput, SomeWhiteFrames) {
   for (const cv::Point at : {cv::Point(20, 100), cv::Point(80, 55)})  // beside the ball, behind it
     EXPECT_NEAR(p.background.plate.at<cv::Vec3f>(at)[1], tableColour(at.x, at.y)[1], 2.0f);
   expectFrame(p, key);
+  for (const int code : {255, 0}) {  // nothing is drawn into such a frame
+    FrameInput in;
+    in.bgr = cv::Mat(kHeight, kWidth, CV_8UC3, cv::Scalar::all(code));
+    in.labels = key.labels, in.camera = key.camera;
+    ObjectInFrame ball;
+    ball.name = "ball", ball.removed = true, ball.vertices = p.surfaces[0].key_vertices;
+    in.objects = {ball};
+    const FrameOutput out = Renderer(std::make_shared<const Prepared>(p), params()).composite(in);
+    EXPECT_EQ(cv::norm(out.bgr, in.bgr, cv::NORM_INF), 0.0);
+    EXPECT_EQ(cv::countNonZero(out.provenance), 0);
+  }
 }
 
 TEST(BadInput, AMeshWithoutItsVisibleSide) {
