@@ -1,9 +1,14 @@
 #include "prepare_remarks.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <opencv2/imgproc.hpp>
 #include <string>
+#include <vector>
+
+#include "texture/mesh_topology.hpp"
 
 namespace calipso::render {
 namespace {
@@ -12,6 +17,7 @@ constexpr double kMostInvented = 0.5, kMostCovered = 0.8;  // parts of the pictu
 constexpr double kMostClipped = 0.3;  // part of an object's pixels that is saturated or black
 constexpr double kSaturated = 250.0, kBlack = 3.0;  // code values
 constexpr double kLeastModelled = 0.7;              // part of a mask that the model must cover
+constexpr double kManyHoles = 0.1;                  // of what is seen of an object
 constexpr double kMuchUnseen = 0.25;                // part of an object's surface
 
 int percent(double part) { return static_cast<int>(std::lround(100.0 * part)); }
@@ -30,6 +36,30 @@ cv::Mat drawn(const Actor& actor, const cv::Size& size) {
       out.at<std::uint8_t>(v, u) = buffer.ids(v)[u] != VisibilityBuffer::kNothing ? 255 : 0;
   }
   return out;
+}
+
+// Part of the pixels that see an open surface which see the side of its piece that fewer do: through
+// holes its inside is seen.
+double seenThroughHoles(const Actor& actor, const Eigen::Vector3f& eye, const cv::Size& size) {
+  if (actor.surface->winding != 0 || isSheet(actor.vertices, actor.surface->triangles)) return 0.0;
+  const VisibilityBuffer buffer({0, 0, size.width, size.height}, {&actor.screen});
+  const std::vector<int> parts = connectedParts(actor.vertices, actor.surface->triangles);
+  std::map<int, std::array<int, 2>> sides;  // by part
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u) {
+      const std::uint32_t id = buffer.ids(v)[u];
+      if (id == VisibilityBuffer::kNothing) continue;
+      const int triangle = VisibilityBuffer::triangleOf(id);
+      const Eigen::Vector3i& t = actor.surface->triangles[triangle];
+      const Eigen::Vector3f &a = actor.vertices[t[0]], &b = actor.vertices[t[1]],
+                            &c = actor.vertices[t[2]];
+      ++sides[parts[triangle]][(b - a).cross(c - a).dot(eye - a) > 0.0f ? 1 : 0];
+    }
+  }
+  int fewer = 0, all = 0;
+  for (const auto& [part, seen] : sides)
+    fewer += std::min(seen[0], seen[1]), all += seen[0] + seen[1];
+  return static_cast<double>(fewer) / std::max(1, all);
 }
 
 void remarkPlace(const std::vector<ClipFrame>& frames, Prepared& p) {
@@ -99,6 +129,13 @@ void remarkObject(const std::vector<ClipFrame>& frames, const Actor& actor, std:
     p.remarks.push_back(who + ": its model covers " + std::to_string(percent(modelled)) +
                         " % of its mask; the side that the camera sees is missing or misplaced, "
                         "and is left out when the object is drawn elsewhere");
+  }
+  const Eigen::Vector3f eye = p.camera.world_from_camera.translation().cast<float>();
+  const double through = seenThroughHoles(actor, eye, mask.size());
+  if (through > kManyHoles) {
+    p.remarks.push_back(who + ": its model is open, and " + std::to_string(percent(through)) +
+                        " % of what is seen of it is its inside; close the holes that the object "
+                        "does not have");
   }
   const Appearance& a = p.appearances[i];
   if (p.light.determined && !p.light.toldGloss(i)) {

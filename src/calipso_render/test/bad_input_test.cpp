@@ -106,6 +106,20 @@ TEST(BadInput, SomeWhiteFrames) {
   }
 }
 
+TEST(BadInput, AMeshWithHoles) {
+  const ClipFrame key = frameWithBall(ballAt(kCentre));
+  EXPECT_FALSE(says(learn(key, ballAt(kCentre)), "is open"));
+  ObjectModel model = ballAt(kCentre);
+  int kept = 0;
+  for (int t = 0; t < model.mesh.triangleCount(); ++t) {
+    if (t % 3 != 0) model.mesh.triangles.row(kept++) = model.mesh.triangles.row(t).eval();
+  }
+  model.mesh.triangles.conservativeResize(kept, 3);
+  const Prepared p = learn(key, model);
+  EXPECT_TRUE(says(p, "its model is open"));
+  expectFrame(p, key);
+}
+
 TEST(BadInput, AMeshWithoutItsVisibleSide) {
   const ClipFrame key = frameWithBall(ballAt(kCentre));
   ObjectModel model = ballAt(kCentre);
