@@ -90,8 +90,7 @@ void remarkPlace(const std::vector<ClipFrame>& frames, Prepared& p) {
   if (!p.unseen_shade.empty())
     p.remarks.push_back(
         "something that no frame shows keeps the sun off a part of the place; it is taken to keep "
-        "it "
-        "off objects before that part, too, and before what is not seen as before the nearest "
+        "it off objects before that part, too, and before what is not seen as before the nearest "
         "part");
   if (!p.light.determined)
     p.remarks.push_back(

@@ -41,7 +41,8 @@ std::optional<ClipSample> withoutBlankFrames(const ClipSample& clip) {
   std::vector<double> sorted = parts;
   std::sort(sorted.begin(), sorted.end());
   const double usual = sorted[sorted.size() / 2];
-  if (!isBlank(*std::max_element(parts.begin() + 1, parts.end()), usual)) return std::nullopt;
+  if (std::none_of(parts.begin() + 1, parts.end(), [&](double p) { return isBlank(p, usual); }))
+    return std::nullopt;
   ClipSample kept(frames.size());
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (i == 0 || !isBlank(parts[i], usual)) kept.add(frames[i]);
