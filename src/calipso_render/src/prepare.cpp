@@ -227,6 +227,15 @@ NoiseModel noiseOf(const std::vector<ClipFrame>& frames, const cv::Mat& steadine
   return NoiseModel::estimate(pictures, steady);
 }
 
+// How the objects lie in the key frame, and what is around them there.
+void findOutlines(const std::vector<Actor>& actors, const cv::Mat& picture,
+                  const RenderParams& params, Prepared& p) {
+  for (const Actor& a : actors) p.outlines.push_back(outlineOf(a, p.key_labels.size()));
+  p.fronts = frontsOf(p, params);
+  p.footprints = footprintsOf(p, picture, params.background.mask_margin_px);
+  p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
+}
+
 }  // namespace
 
 Prepared prepare(const ClipSample& given_clip, const std::vector<ObjectModel>& models,
@@ -275,10 +284,7 @@ Prepared prepare(const ClipSample& given_clip, const std::vector<ObjectModel>& m
   const std::vector<Actor> resting = restingAmong(actors, p.moves);
   const ShadowMap sun_past_resting = sunOver(resting, p.light.light);
   const SkyMap sky_past_resting = skyOver(resting, params);
-  for (const Actor& a : actors) p.outlines.push_back(outlineOf(a, p.key_labels.size()));
-  p.fronts = frontsOf(p, params);
-  p.footprints = footprintsOf(p, picture, params.background.mask_margin_px);
-  p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
+  findOutlines(actors, picture, params, p);
   prepareBackground({frames, light_views, actors, seen, picture, sun, sky, sun_past_resting,
                      sky_past_resting, p.camera_moves},
                     params, p);

@@ -358,7 +358,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   if (any_rests && !isWater(p.mirror)) liftTraces(e, place, sun, sky, params, traces, p);
   if (any_rests && !p.relief.empty()) traces |= contactTraces(e.actors, e.picture, params, p);
   if (any_moves) traces |= passingTraces(e, place, in_sun, sun, sky, params, p);
-  if (!p.sunless.empty()) sun.setTo(1.0f, p.sunless);
+  if (!p.sunless.empty()) sun.setTo(1.0f, p.sunless);  // what passing shade has told since
   const cv::Mat ground = groundNearness(params.planes, key.camera, p.scenery);
   if (p.mirror.established())
     takeOffMirrored((ground > 0.0f) & (place.off_planes == 0), traces, key, p);

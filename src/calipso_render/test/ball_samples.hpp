@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -19,6 +20,18 @@ inline std::vector<LightSample> ballSamples(const Eigen::Vector3f& sun) {
     samples.push_back({n, n, view, cv::Vec3f(0.2f, 0.4f, 0.6f) * shade, 0, SkySeen::all(n)});
   }
   return samples;
+}
+
+// The same, glossy: it mirrors its surroundings at its rims, and a shadow tells the sun.
+inline LightEvidence glossyBallWithShadow(const Eigen::Vector3f& sun) {
+  LightEvidence evidence;
+  evidence.samples = ballSamples(sun), evidence.clusters = 1;
+  for (LightSample& s : evidence.samples)
+    s.radiance += cv::Vec3f::all(0.3f * 0.02f * grazing(s.normal.dot(s.view)));
+  evidence.shadow_misfit = [sun](const Eigen::Vector3f& l) {
+    return -2000.0 * std::max(0.0f, l.dot(sun) - 0.99f) / 0.01;
+  };
+  return evidence;
 }
 
 // The ball's samples under an ambient light with these harmonics, with errors of 1 %.

@@ -292,13 +292,7 @@ TEST(FitLight, TakesAUsualStrengthWhereShadowsTellTheDirectionAlone) {
 // What a glossy ball over ground that the picture shows mirrors from straight below it.
 cv::Vec3f mirroredGround(const cv::Vec3f& colour, float brightness, LightFit& fit) {
   const Eigen::Vector3f sun = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();
-  LightEvidence evidence;
-  evidence.samples = ballSamples(sun), evidence.clusters = 1;
-  for (LightSample& s : evidence.samples)
-    s.radiance += cv::Vec3f::all(0.3f * 0.02f * grazing(s.normal.dot(s.view)));
-  evidence.shadow_misfit = [sun](const Eigen::Vector3f& l) {
-    return -2000.0 * std::max(0.0f, l.dot(sun) - 0.99f) / 0.01;
-  };
+  LightEvidence evidence = glossyBallWithShadow(sun);
   evidence.below = colour, evidence.below_brightness = brightness;
   fit = fitLight(evidence, kUp.cast<float>(), {0, -1, 0});
   const Eigen::Vector3f view(0.0f, -1.0f, 0.0f), n = (view - kUp.cast<float>()).normalized();

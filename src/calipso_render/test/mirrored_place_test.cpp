@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <opencv2/imgproc.hpp>
 
 #include "ball_samples.hpp"
@@ -19,13 +18,7 @@ using namespace testing;
 TEST(FitLight, LetsRimsMirrorWhatIsSeenBehindThem) {
   const Eigen::Vector3f sun = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized(), up(0, 0, 1),
                         view(0, -1, 0);
-  LightEvidence evidence;
-  evidence.samples = ballSamples(sun), evidence.clusters = 1;
-  for (LightSample& s : evidence.samples)
-    s.radiance += cv::Vec3f::all(0.3f * 0.02f * grazing(s.normal.dot(s.view)));
-  evidence.shadow_misfit = [sun](const Eigen::Vector3f& l) {
-    return -2000.0 * std::max(0.0f, l.dot(sun) - 0.99f) / 0.01;
-  };
+  LightEvidence evidence = glossyBallWithShadow(sun);
   evidence.behind = {0.06f, 0.1f, 0.14f};
   const LightFit fit = fitLight(evidence, up, view);
   ASSERT_TRUE(fit.from_shadows);

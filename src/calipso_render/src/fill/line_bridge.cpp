@@ -129,7 +129,7 @@ class Bridger {
       if (const auto cost = misfit(a, b, gap, differenceAcross(a, b)))
         return Bridge{&a, &b, gap, *cost, kOwn};
     }
-    if ((!a.isThin() && !a.is_joint) || (!b.isThin() && !b.is_joint)) return std::nullopt;
+    if (!a.isLine() || !b.isLine()) return std::nullopt;
     const auto alone = misfit(a, b, gap, differenceAlone(a, b));
     return alone ? std::optional<Bridge>({&a, &b, gap, 1.0f + *alone, {kAlone, kAlone}})
                  : std::nullopt;

@@ -156,7 +156,7 @@ class LineEndFinder {
   // An edge of a thin line goes to the line's middle, and along it: through its middles near the
   // end and far from it.
   bool centre(LineEnd& end) const {
-    for (int i = 0; i < kCentrings && (end.is_joint || end.isThin()); ++i) {
+    for (int i = 0; i < kCentrings && end.isLine(); ++i) {
       const auto near = middleAt(end, kFirst, kLast),
                  far = middleAt(end, static_cast<int>(end.length) - kLast,
                                 static_cast<int>(end.length) - kFirst);

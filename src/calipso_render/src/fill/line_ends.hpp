@@ -24,6 +24,7 @@ struct LineEnd {
   bool is_joint = false;            // in the middle of a line between two things: see jointsOf()
 
   bool isThin() const;  // a line, not an edge between two things
+  bool isLine() const { return is_joint || isThin(); }
 };
 
 // Straight edges of a picture, from end to end. @param source CV_8UC1: known; image CV_32FC3

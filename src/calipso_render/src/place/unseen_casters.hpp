@@ -9,15 +9,16 @@ namespace calipso::render {
 // has some.
 constexpr std::uint8_t kSunUntold = 0, kNoSun = 1, kSun = 2;
 
+struct CastersShade {
+  cv::Mat hidden;  // CV_8UC1: hidden part of the sun, 255 all; empty: nowhere
+  cv::Mat known;   // CV_8UC1: 255 on surfaces on which the sun and its absence are told apart
+};
+
 // Where something that no frame shows keeps the sun off the place (a window's frame, a tree behind
 // the camera): where passing shade left it as bright as it was, and what of the same surface is as
 // dark as that, if brightness tells the two apart there.
 // @param told what passing shade tells @param plate CV_32FC3, code values
 // @param surface CV_8UC1, from 1 on; may be empty: nothing is inferred for more than what was told
-struct CastersShade {
-  cv::Mat hidden;  // CV_8UC1: hidden part of the sun, 255 all; empty: nowhere
-  cv::Mat known;   // CV_8UC1: 255 on surfaces on which the sun and its absence are told apart
-};
 CastersShade unseenCastersShade(const cv::Mat& told, const cv::Mat& plate, const cv::Mat& surface);
 
 // CV_8UC1: lightLevel() of the sun below which no shade brings a place that part of the sun is hidden

@@ -5,7 +5,7 @@
 
 namespace calipso::render {
 
-// Tells a pattern's colours from those of single things on it (a guitar's sound hole on its wood):
+// Tells a pattern's colours from those of single things on it (a badge on a coat):
 // these are rare, not all over it, and do not go on all around it as a band does.
 class PatternMotifs {
  public:
