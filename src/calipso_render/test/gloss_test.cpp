@@ -84,6 +84,33 @@ TEST(FitGloss, TakesTheMiddleOfWhatANarrowHighlightLeaves) {
   EXPECT_NEAR(found->gloss.specular, 0.05f, 0.005f);
 }
 
+// A flat thing with a rounded edge: few places show the highlight, and errors of the shading farther
+// off look like a broad one.
+TEST(FitGloss, TakesTheNarrowerOfTwoThatExplainAsMuch) {
+  LightFit fit = plainFit(Light());
+  fit.light.direction = Eigen::Vector3f(0.4f, -0.6f, 0.7f).normalized();
+  const Eigen::Vector3f h = (fit.light.direction + Eigen::Vector3f(0, -1, 0)).normalized();
+  int clipped = 0, near = 0;
+  cv::RNG random(7);
+  std::vector<HighlightSample> few;
+  for (HighlightSample s : clippedHighlight(fit.light, 0.08f, clipped)) {
+    const float angle = std::acos(std::min(1.0f, h.dot(s.at.normal)));
+    if (angle < 0.12f ? ++near % 7 != 0 : angle < 0.2f) continue;
+    const auto shine = [&](const Gloss& gloss) {
+      return specularShading(fit.light, gloss, s.at.normal, s.at.view, 1.0f);
+    };
+    s.at.radiance = diffuseShading(fit.light, s.at.normal, 1.0f).mul(cv::Vec3f(0.2f, 0.4f, 0.6f)) +
+                    shine({0.007f, 0.08f, 0.0f});
+    if (angle > 0.2f) s.at.radiance += shine({0.028f, 0.3f, 0.0f});
+    s.at.radiance *= 1.0f + static_cast<float>(random.gaussian(0.05));
+    few.push_back(s);
+  }
+  const std::optional<SeenGloss> found = fitGloss(few, fit, {});
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->gloss.roughness, 0.08f, 0.02f);
+  EXPECT_GT(found->roughest, 0.2f);  // it says that the broad one explains it, too
+}
+
 // Three objects: two of one gloss, and one of another.
 TEST(SeenGlosses, HoldEachObjectsOwnWhereItDiffers) {
   LightFit fit = plainFit(Light());

@@ -198,6 +198,15 @@ double leastOf(double before, double middle, double after) {
   return bend > 0.0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0.0;
 }
 
+// The first of the costs' dips within `limit`: a broad lobe explains errors of the diffuse shading,
+// too, so that where a narrower one does as well that is the highlight. @param least of the costs
+std::size_t smoothestDip(const std::vector<double>& costs, std::size_t least, double limit) {
+  for (std::size_t i = 1; i < least; ++i) {
+    if (costs[i] <= limit && costs[i] < costs[i - 1] && costs[i] <= costs[i + 1]) return i;
+  }
+  return least;
+}
+
 // The best of the roughnesses below `limit`, and which others explain the rows as well. @param most
 // error that it may leave
 // @param worst out: the worst error that any leaves
@@ -220,9 +229,12 @@ std::optional<Found> bestRoughness(const std::vector<Row>& rows,
     costs.push_back(s.strength > 0.0 ? s.cost : 1e30);
     worst = std::max(worst, s.cost);
   }
-  const std::size_t best = std::min_element(costs.begin(), costs.end()) - costs.begin();
-  if (costs.empty() || costs[best] >= most) return std::nullopt;
-  const auto limitOf = [&](double errors) { return costs[best] * (1.0 + errors / weightOf(rows)); };
+  const std::size_t least = std::min_element(costs.begin(), costs.end()) - costs.begin();
+  if (costs.empty() || costs[least] >= most) return std::nullopt;
+  const auto limitOf = [&](double errors) {
+    return costs[least] * (1.0 + errors / weightOf(rows));
+  };
+  const std::size_t best = smoothestDip(costs, least, limitOf(kAlike));
   const auto lastWithin = [&](double cost) {
     std::size_t last = best;
     while (last + 1 < costs.size() && costs[last + 1] <= cost) ++last;
