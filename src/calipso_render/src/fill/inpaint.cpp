@@ -1,5 +1,3 @@
-#include "calipso_render/inpaint.hpp"
-
 #include <algorithm>
 #include <functional>
 #include <opencv2/imgproc.hpp>
@@ -11,6 +9,7 @@
 #include "fill/colour_trend.hpp"
 #include "fill/hidden_plane.hpp"
 #include "fill/hidden_sky.hpp"
+#include "fill/inpaint_at_size.hpp"
 #include "fill/lattice.hpp"
 #include "fill/line_bridge.hpp"
 #include "fill/line_ends.hpp"
@@ -341,9 +340,8 @@ void fillRest(const InpaintParams& params, Canvas& canvas) {
 
 }  // namespace
 
-InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& banned,
-                      const InpaintParams& params) {
-  CV_Assert(image.type() == CV_32FC3 && hole.type() == CV_8UC1 && image.size() == hole.size());
+InpaintResult inpaintAtSize(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& banned,
+                            const InpaintParams& params) {
   CV_Assert(params.nearness.empty() ||
             (params.nearness.type() == CV_32FC1 && params.nearness.size() == hole.size()));
   InpaintResult result{image.clone(), cv::Mat(image.size(), CV_16SC2, cv::Scalar(-1, -1)),

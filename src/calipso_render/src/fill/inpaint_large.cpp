@@ -1,0 +1,112 @@
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+#include "fill/inpaint_at_size.hpp"
+
+namespace calipso::render {
+namespace {
+
+// px of a picture's longer side, about, at which what is sought for filling (lines, patterns, planes
+// and patches) has the size that it is sought with
+constexpr int kWorkingSide = 640;
+
+int timesTooLarge(const cv::Size& size) {
+  return std::max(1, (std::max(size.width, size.height) + kWorkingSide / 2 - 1) / kWorkingSide);
+}
+
+// From a picture that is `times` as large, and what is known of it, to one of about kWorkingSide.
+class Reduction {
+ public:
+  Reduction(const cv::Size& large, int times)
+      : times_(times),
+        large_(large),
+        small_((large.width + times - 1) / times, (large.height + times - 1) / times) {}
+
+  // Means. @param picture of any type; may be empty
+  cv::Mat means(const cv::Mat& picture) const { return reduced(picture, cv::INTER_AREA); }
+  // The values in the squares' middles.
+  cv::Mat middles(const cv::Mat& picture) const { return reduced(picture, cv::INTER_NEAREST); }
+  // CV_8UC1: 255 where any pixel of a square is set.
+  cv::Mat any(const cv::Mat& mask) const {
+    return mask.empty() ? mask : cv::Mat(means(mask != 0) > 0);
+  }
+  cv::Matx33d fromSmall(const cv::Matx33d& from_pixels) const {
+    const double t = times_, middle = 0.5 * (times_ - 1);
+    return from_pixels * cv::Matx33d(t, 0, middle, 0, t, middle, 0, 0, 1);
+  }
+  // Smooth. @param picture CV_32F
+  cv::Mat enlarged(const cv::Mat& picture) const {
+    cv::Mat out;
+    cv::resize(picture, out, small_ * times_, 0.0, 0.0, cv::INTER_LINEAR);
+    return out(cv::Rect({0, 0}, large_));
+  }
+  cv::Point squareOf(int u, int v) const { return {u / times_, v / times_}; }
+  // The pixel that lies in a square as (u, v) does in its own.
+  cv::Point alike(const cv::Vec2s& square, int u, int v) const {
+    return {std::min(square[0] * times_ + u % times_, large_.width - 1),
+            std::min(square[1] * times_ + v % times_, large_.height - 1)};
+  }
+
+ private:
+  cv::Mat reduced(const cv::Mat& picture, int by) const {
+    if (picture.empty()) return picture;
+    const cv::Size whole = small_ * times_;
+    cv::Mat padded, out;
+    cv::copyMakeBorder(picture, padded, 0, whole.height - large_.height, 0,
+                       whole.width - large_.width, cv::BORDER_REPLICATE);
+    cv::resize(padded, out, small_, 0.0, 0.0, by);
+    return out;
+  }
+
+  int times_;
+  cv::Size large_, small_;
+};
+
+InpaintParams reduced(const InpaintParams& params, const Reduction& reduction) {
+  InpaintParams small = params;
+  small.nearness = reduction.middles(params.nearness);
+  small.surface = reduction.middles(params.surface);
+  small.sky = reduction.middles(params.sky);
+  small.sure = reduction.middles(params.sure);
+  for (cv::Matx33d& plane : small.planes) plane = reduction.fromSmall(plane);
+  return small;
+}
+
+// What the small picture was filled with, and the detail that its copies have in the large one.
+InpaintResult enlarged(const cv::Mat& image, const cv::Mat& hole, const InpaintResult& small,
+                       const Reduction& reduction) {
+  const cv::Mat smooth = reduction.enlarged(small.image);
+  InpaintResult large{image.clone(), cv::Mat(image.size(), CV_16SC2, cv::Scalar(-1, -1)),
+                      reduction.enlarged(small.lift).clone(), small.patches_found};
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < image.rows; ++v) {
+    for (int u = 0; u < image.cols; ++u) {
+      if (hole.at<std::uint8_t>(v, u) == 0) continue;
+      cv::Vec3f& colour = large.image.at<cv::Vec3f>(v, u);
+      colour = smooth.at<cv::Vec3f>(v, u);
+      const cv::Vec2s square = small.origin.at<cv::Vec2s>(reduction.squareOf(u, v));
+      if (square[0] < 0) continue;
+      const cv::Point from = reduction.alike(square, u, v);
+      const cv::Vec3f detail = image.at<cv::Vec3f>(from) - smooth.at<cv::Vec3f>(from);
+      for (int c = 0; c < 3; ++c) colour[c] = std::clamp(colour[c] + detail[c], 0.0f, 255.0f);
+      large.origin.at<cv::Vec2s>(v, u) = {static_cast<short>(from.x), static_cast<short>(from.y)};
+    }
+  }
+  return large;
+}
+
+}  // namespace
+
+InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& banned,
+                      const InpaintParams& params) {
+  CV_Assert(image.type() == CV_32FC3 && hole.type() == CV_8UC1 && image.size() == hole.size());
+  const int times = timesTooLarge(image.size());
+  if (times == 1) return inpaintAtSize(image, hole, banned, params);
+  const Reduction reduction(image.size(), times);
+  return enlarged(image, hole,
+                  inpaintAtSize(reduction.means(image), reduction.any(hole), reduction.any(banned),
+                                reduced(params, reduction)),
+                  reduction);
+}
+
+}  // namespace calipso::render
