@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <opencv2/core/utils/logger.hpp>
@@ -10,8 +11,9 @@
 
 constexpr char kUsage[] =
     "usage: evaluate [--pictures DIR] [--summaries DIR] [--sheets DIR] [--appearance-only] "
-    "SCENE_DIR...\n"
+    "[--enlarge TIMES] SCENE_DIR...\n"
     "  One line of JSON per scene folder with ground truth.\n";
+constexpr int kMostTimes = 8;
 
 namespace {
 
@@ -44,8 +46,14 @@ int main(int argc, char** argv) {
       options.summaries = argv[++first];
     else if (std::strcmp(argv[first], "--sheets") == 0 && first + 1 < argc)
       options.sheets = argv[++first];
+    else if (std::strcmp(argv[first], "--enlarge") == 0 && first + 1 < argc)
+      options.enlarge = std::atoi(argv[++first]);
     else
       first = argc;
+  }
+  if (options.enlarge < 1 || options.enlarge > kMostTimes) {
+    std::fprintf(stderr, "--enlarge: 1 to %d times\n%s", kMostTimes, kUsage);
+    return 1;
   }
   if (first >= argc) {
     std::fprintf(stderr, "%s", kUsage);

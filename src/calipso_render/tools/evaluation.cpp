@@ -45,7 +45,9 @@ cv::Mat maskOf(const FrameInput& in, const std::vector<Surface>& surfaces) {
 class Evaluation {
  public:
   Evaluation(const std::string& directory, const EvaluationOptions& options)
-      : scene_(loadScene(directory)), truth_(loadTruth(scene_)), options_(options) {
+      : scene_(enlarged(loadScene(directory), options.enlarge)),
+        truth_(loadTruth(scene_)),
+        options_(options) {
     params_.planes = scene_.planes;
     params_.up = -scene_.gravity.normalized();
     params_.depth = loadDepth(scene_);

@@ -19,6 +19,7 @@ struct EvaluationOptions {
   std::string summaries;
   std::string sheets;            // folder for blind sheets; empty: none
   bool appearance_only = false;  // leaves background and times out
+  int enlarge = 1;               // times: pictures, and what is known of them
 };
 
 // Runs the whole renderer on a scene folder, the true shape and masks standing in for alignment and

@@ -4,6 +4,7 @@
 
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 namespace calipso::render {
@@ -68,7 +69,24 @@ Truth::Object toObject(const Scene& scene, const YAML::Node& node) {
   return object;
 }
 
+// As large as an enlarged scene's picture. @param by cv::InterpolationFlags
+cv::Mat asLarge(const Scene& scene, const cv::Mat& picture, int by) {
+  const cv::Size size(scene.camera.width, scene.camera.height);
+  const int times = picture.empty() ? 1 : size.width / picture.cols;
+  if (times < 2 || size != picture.size() * times) return picture;
+  cv::Mat large;
+  cv::resize(picture, large, size, 0.0, 0.0, by);
+  return large;
+}
+
 }  // namespace
+
+Scene enlarged(Scene scene, int times) {
+  Camera& c = scene.camera;
+  c.width *= times, c.height *= times, c.fx *= times, c.fy *= times;
+  c.cx = times * c.cx + 0.5 * (times - 1), c.cy = times * c.cy + 0.5 * (times - 1);
+  return scene;
+}
 
 Truth loadTruth(const Scene& scene) {
   const std::string file = scene.directory + "/scene.yaml";
@@ -91,7 +109,7 @@ cv::Mat loadFrame(const Scene& scene, int k) {
   const std::string file = scene.framePath(k);
   const cv::Mat frame = cv::imread(file, cv::IMREAD_COLOR);
   if (frame.empty()) throw std::runtime_error(file + ": cannot be read as a picture");
-  return frame;
+  return asLarge(scene, frame, cv::INTER_CUBIC);
 }
 
 cv::Mat loadLabels(const Scene& scene, int k) {
@@ -101,7 +119,7 @@ cv::Mat loadLabels(const Scene& scene, int k) {
     cv::Mat mask = cv::imread(stem + numbered("_%06d.png", k), cv::IMREAD_GRAYSCALE);
     if (mask.empty()) mask = cv::imread(stem + "_000000.png", cv::IMREAD_GRAYSCALE);
     if (mask.empty()) throw std::runtime_error(stem + "_000000.png: no mask");
-    labels.setTo(o.index, mask > 127);
+    labels.setTo(o.index, asLarge(scene, mask, cv::INTER_LINEAR) > 127);
   }
   return labels;
 }
@@ -113,14 +131,14 @@ cv::Mat loadDepth(const Scene& scene) {
   if (coded.type() != CV_16UC1)
     throw std::runtime_error(scene.depth_path + ": no picture with one channel of 16 bits");
   coded.convertTo(depth, CV_32F, scene.depth_scale);
-  return depth;
+  return asLarge(scene, depth, cv::INTER_NEAREST);
 }
 
 std::optional<cv::Mat> loadPlate(const Scene& scene, int k) {
   cv::Mat plate = cv::imread(scene.directory + numbered("/plates/%06d.png", k), cv::IMREAD_COLOR);
   if (plate.empty()) plate = cv::imread(scene.directory + "/plates/000000.png", cv::IMREAD_COLOR);
   if (plate.empty()) return std::nullopt;
-  return plate;
+  return asLarge(scene, plate, cv::INTER_CUBIC);
 }
 
 std::optional<cv::Mat> loadAlbedo(const Scene& scene) {
@@ -129,7 +147,7 @@ std::optional<cv::Mat> loadAlbedo(const Scene& scene) {
   if (coded.type() != CV_16UC3) return std::nullopt;
   cv::Mat albedo;
   coded.convertTo(albedo, CV_32F, 1.0 / 65535.0);
-  return albedo;
+  return asLarge(scene, albedo, cv::INTER_NEAREST);
 }
 
 }  // namespace calipso::render

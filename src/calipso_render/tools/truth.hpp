@@ -26,6 +26,10 @@ struct Truth {
 // @throw std::runtime_error naming file and key
 Truth loadTruth(const Scene& scene);
 
+// The same scene in a picture so many times as wide and high: all that is loaded for it below is
+// enlarged, too.
+Scene enlarged(Scene scene, int times);
+
 // Frame k, CV_8UC3. @throw std::runtime_error naming the file
 cv::Mat loadFrame(const Scene& scene, int k);
 
