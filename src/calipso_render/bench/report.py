@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes the report page of calipso_render from what its evaluator and its benchmark printed.
 
-Usage: report.py OUT.md EVALUATE.jsonl BENCHMARK.jsonl
+Usage: report.py OUT.md EVALUATE.jsonl ENLARGED.jsonl BENCHMARK.jsonl
 """
 import json
 import os
@@ -37,6 +37,18 @@ shaded and replaced. Times are wall times of the machine while it ran, of frames
 
 """
 
+# What is left out of a scene's enlarged figures: pictures that are enlarged say no more of these.
+OF_FULL_SIZE = {"roughness_observed", "roughness_range", "roughness_in_range", "second_order_ambient", "undeformed_psnr_db",
+                "seam_psnr_db", "seam_drawn_psnr_db", "moved_copied_psnr_db", "relighting_gain_db",
+                "relighting_gain_turned_db"}
+
+ENLARGED = """
+## Twice as large
+The same scenes enlarged, 640 x 360 to 1280 x 720, with all that is known of them: what larger pictures take, and whether
+lengths in pixels are right for these, too. Enlarged pictures are softer than a camera's.
+
+"""
+
 DRAWING = """
 ## Drawing
 One object of {triangles} triangles that covers {percent:.0f} % of 1280 x 720, every vertex new in every frame, over a table that
@@ -65,12 +77,12 @@ def read(path):
         return [json.loads(line) for line in lines if line.strip()]
 
 
-def evaluation(cases):
+def evaluation(cases, columns=None):
     if not cases:
         return "No scene with ground truth was given (`make bench SCENES=...`).\n"
     text = "| | " + " | ".join(case["case"] for case in cases) + " |\n"
     text += "|---|" + "---|" * len(cases) + "\n"
-    for key, title in COLUMNS:
+    for key, title in columns or COLUMNS:
         text += f"| {title} | " + " | ".join(cell(case.get(key)) for case in cases) + " |\n"
     return text
 
@@ -120,12 +132,14 @@ def filling(cases):
 
 
 def main():
-    if len(sys.argv) != 4:
+    if len(sys.argv) != 5:
         sys.exit(__doc__)
-    benchmark = read(sys.argv[3])
+    enlarged, benchmark = read(sys.argv[3]), read(sys.argv[4])
     with open(sys.argv[1], "w", encoding="utf-8") as page:
         cases = read(sys.argv[2])
         page.write(HEADER + evaluation(cases) + pictures(cases, sys.argv[1]))
+        if enlarged:
+            page.write(ENLARGED + evaluation(enlarged, [c for c in COLUMNS if c[0] not in OF_FULL_SIZE]))
         page.write(drawing([case for case in benchmark if case["case"].startswith("drawing_")]))
         page.write(filling([case for case in benchmark if case["case"] == "filling"]))
 

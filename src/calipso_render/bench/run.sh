@@ -14,6 +14,11 @@ for scene in "$@"; do
   if [ -d "$scene/masks" ] && grep -q true_mesh "$scene/scene.yaml"; then set -- "$@" "$scene"; else echo "$scene has no ground truth: left out"; fi
 done
 : > "$work/evaluate.jsonl"
-[ $# -eq 0 ] || rosrun calipso_render evaluate --summaries "$output/appearance" "$@" > "$work/evaluate.jsonl"
+: > "$work/enlarged.jsonl"
+if [ $# -gt 0 ]; then
+  rosrun calipso_render evaluate --summaries "$output/appearance" "$@" > "$work/evaluate.jsonl"
+  rosrun calipso_render evaluate --enlarge 2 "$@" > "$work/enlarged.jsonl"
+fi
 rosrun calipso_render benchmark "$@" > "$work/benchmark.jsonl"
-/usr/bin/python3 "$(dirname "$0")/report.py" "$output/appearance.md" "$work/evaluate.jsonl" "$work/benchmark.jsonl"
+/usr/bin/python3 "$(dirname "$0")/report.py" "$output/appearance.md" "$work/evaluate.jsonl" "$work/enlarged.jsonl" \
+  "$work/benchmark.jsonl"
