@@ -98,25 +98,34 @@ TEST(PatchOrigins, ComeFromWhereTheGroundIsAboutAsNear) {
   }
 }
 
-// A board on a darker floor, and a dark spot at the hole's rim: what is around the hole is the
-// board, so nothing comes from the floor.
+// A board on a floor that is darker, by much or little, and as dark a spot at the hole's rim: what is
+// around the hole is the board, so nothing comes from the floor.
 TEST(PatchOrigins, ComeFromWhatHasTheColourAroundTheHole) {
   constexpr int kFloor = 112;  // its first row
-  cv::Mat image = 0.3 * spots(240, 200) + cv::Scalar::all(120.0),
-          hole = cv::Mat::zeros(200, 240, CV_8U);
-  for (const cv::Rect& dark : {cv::Rect(0, kFloor, 240, 200 - kFloor), cv::Rect(90, 34, 40, 6)})
-    cv::subtract(image(dark), cv::Scalar::all(110.0), image(dark));
-  hole(cv::Rect(80, 40, 70, 60)).setTo(255);
-  pushPull(image, cv::Mat_<float>(1.0f / 255.0f * cv::Mat_<float>(hole == 0))).copyTo(image, hole);
-  const auto fromFloor = [&](float off_colour) {
-    InpaintParams params;
-    params.off_colour = off_colour, params.away_row = 3.0f, params.off_bland = 0.0f;
-    cv::Mat rows;
-    cv::extractChannel(patchOrigins(image, hole, hole == 0, {}, params), rows, 1);
-    return cv::countNonZero(rows >= kFloor);
+  struct Case {
+    double grain, darker;
+    int spot;       // rows
+    int otherwise;  // px that would come from the floor, at least
   };
-  EXPECT_GT(fromFloor(0.0f), 100);
-  EXPECT_EQ(fromFloor(1.0f), 0);
+  for (const Case& c : {Case{0.3, 110.0, 6, 100}, Case{0.4, 30.0, 14, 20}}) {
+    cv::Mat image = c.grain * spots(240, 200) + cv::Scalar::all(120.0),
+            hole = cv::Mat::zeros(200, 240, CV_8U);
+    for (const cv::Rect& dark :
+         {cv::Rect(0, kFloor, 240, 200 - kFloor), cv::Rect(90, 40 - c.spot, 40, c.spot)})
+      cv::subtract(image(dark), cv::Scalar::all(c.darker), image(dark));
+    hole(cv::Rect(80, 40, 70, 60)).setTo(255);
+    const cv::Mat seen = hole == 0;
+    pushPull(image, cv::Mat_<float>(1.0f / 255.0f * cv::Mat_<float>(seen))).copyTo(image, hole);
+    const auto fromFloor = [&](float off_colour) {
+      InpaintParams params;
+      params.off_colour = off_colour, params.away_row = 3.0f, params.off_bland = 0.0f;
+      cv::Mat rows;
+      cv::extractChannel(patchOrigins(image, hole, seen, {}, params), rows, 1);
+      return cv::countNonZero(rows >= kFloor);
+    };
+    EXPECT_GT(fromFloor(0.0f), c.otherwise) << c.darker;
+    EXPECT_EQ(fromFloor(1.0f), 0) << c.darker;
+  }
 }
 
 // A dark tower stands at the left and shows again through slits of a hole at the right, too narrow

@@ -16,7 +16,7 @@ constexpr float kNearer = 2.5f;  // times that a source may be nearer or farther
 constexpr float kMisplaced = 2000.0f;
 constexpr float kAsNear = 1.02f;  // times that a place may be nearer than a source as near as it
 constexpr float kOffPattern = 0.75f;      // px by which a copy's way may miss the pattern
-constexpr float kColourVaries = 1000.0f;  // squared code values that are not off a colour
+constexpr float kColourVaries = 250.0f;  // squared code values that are not off a colour
 constexpr float kColourAround = 61.0f;    // px of the square that tells a place's colour
 constexpr float kLivelier = 0.6f;  // part of its own gradients by which a source may have more
 
