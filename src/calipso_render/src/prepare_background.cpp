@@ -271,26 +271,23 @@ void takeOffMirrored(const cv::Mat& planes, cv::Mat& traces, ClipFrame& key, Pre
 }
 
 // @param haze none where objects move: what is measured there has it in
-void findPlaceUmbra(const PlaceEvidence& e, const Haze& haze, const cv::Mat& sun,
-                    const cv::Mat& sky, const cv::Mat& off_planes, const RenderParams& params,
-                    Prepared& p) {
+void findUmbra(const PlaceEvidence& e, const Haze& haze, const ReceiverOf& receiver,
+               const cv::Mat& sun, const cv::Mat& sky, const RenderParams& params, Prepared& p) {
   const Light& light = p.light.light;
-  const cv::Mat picture = withoutHaze(haze, e.picture, p.nearness),
-                plate = withoutHaze(haze, p.background.plate, p.nearness);
-  const cv::Vec3f predicted = predictedUmbra(light, params.planes);
-  if (std::find(p.moves.begin(), p.moves.end(), true) == p.moves.end()) {
-    p.umbra = umbraInPicture(picture, plate, sun, sky, (p.key_labels != 0) | off_planes, predicted);
-  } else {
-    cv::Mat behind = params.depth.clone();
-    if (!behind.empty()) behind.setTo(0.0f, p.key_labels != 0);
-    const auto in_views = umbraInViews(e.views, params.planes, {p.camera, p.background, behind},
-                                       light, p.unseen_shade);
-    p.umbra = in_views.umbra ? *in_views.umbra
-                             : umbraOfPassing(e.frames, params.planes, p.background, predicted);
-    if (in_views.refuted && !p.light.confirmed())  // what moves casts none under this sun
-      p.sunless = cv::Mat(p.shadowless.size(), CV_8U, cv::Scalar(255));
-  }
-  findUmbra(light, picture, plate, sun, p.key_labels, params.planes, p.umbra, p.relief);
+  const bool moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
+  const UmbraSurfaces surfaces(params.planes, p.relief, p.camera);
+  const std::vector<ShadedSpot> spots =
+      moves ? surfaces.shadedInViews(e.views, receiver, p.background, light, p.unseen_shade)
+            : shadedInPicture(withoutHaze(haze, e.picture, p.nearness),
+                              withoutHaze(haze, p.background.plate, p.nearness), sun, sky,
+                              p.key_labels != 0);
+  const SeenUmbra shared = umbraAt(surfaces.onSupports(spots));
+  cv::Vec3f predicted = predictedUmbra(light, params.planes);
+  if (moves && !shared.umbra)
+    predicted = umbraOfPassing(e.frames, params.planes, p.background, predicted);
+  if (moves && shared.refuted && !p.light.confirmed())  // what moves casts none under this sun
+    p.sunless = cv::Mat(p.shadowless.size(), CV_8U, cv::Scalar(255));
+  p.umbra = surfaces.umbra(spots, shared.umbra.value_or(predicted), light);
 }
 
 // What drifts before the camera takes no shadows; the plate has it where the key frame does.
@@ -385,8 +382,11 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
                         ? Haze()
                         : Haze(e.picture, p.scenery, surfaces.sky == InpaintParams::kSky);
   p.veil = veilOf(haze, p.plate_linear, p.nearness);
-  findPlaceUmbra(e, haze, sun, sky, place.off_planes, params, p);
-  if (!p.sunless.empty()) p.sunless = lowestSun(p.sunless, luminance(p.umbra));
+  findUmbra(e, haze, in_sun, sun, sky, params, p);
+  if (p.sunless.empty()) return;
+  cv::Mat umbra;
+  cv::extractChannel(p.umbra, umbra, 3);
+  p.sunless = lowestSun(p.sunless, umbra);
 }
 
 }  // namespace calipso::render

@@ -252,45 +252,6 @@ TEST(PlaceRelief, DepthNoiseMovesAWallLittle) {
   EXPECT_GT(-relief.receiver(80, 45).normal.y(), 0.999f);
 }
 
-TEST(PlaceRelief, ItsUmbraIsMeasuredWhereItsShadeIsSeen) {
-  Relief relief = findRelief(Room().surfaces(), kSun);
-  const cv::Mat plate(kHigh, kWide, CV_32FC3, cv::Scalar::all(180.0));
-  cv::Mat picture = plate.clone(), sun(kHigh, kWide, CV_32F, cv::Scalar(1.0f));
-  const cv::Rect shade(110, 20, 20, 20);
-  sun(shade) = 0.0f;
-  picture(shade).setTo(cv::Scalar::all(codeFromLinear(0.3f * linearFromRealCode(180.0f))));
-  Light light;
-  light.direction = kSun;
-  findUmbra(light, picture, plate, sun, Room().labels, floorPlane(), {0.5f, 0.5f, 0.5f}, relief);
-  EXPECT_NEAR(relief.umbra.at<float>(25, 20), 0.3f, 0.01f);
-}
-
-TEST(PlaceRelief, UnseenShadeIsPredictedFromThatOfThePlanes) {
-  Relief relief = findRelief(Room().surfaces(), kSun);
-  const cv::Mat plate(kHigh, kWide, CV_32FC3, cv::Scalar::all(180.0)),
-      sun(kHigh, kWide, CV_32F, cv::Scalar(1.0f));
-  Light light;  // even ambient light
-  light.direction = kSun;
-  findUmbra(light, plate, plate, sun, Room().labels, floorPlane(), {0.5f, 0.5f, 0.5f}, relief);
-  // as much sun as ambient light on the floor; on the wall it comes under another angle
-  EXPECT_NEAR(relief.umbra.at<float>(25, 20), 1.0f / (1.0f + -kSun.y() / kSun.z()), 0.01f);
-}
-
-TEST(PlaceRelief, PlaneTermsGiveItsOwnLight) {
-  for (const float planes : {0.3f, 0.6f}) {
-    for (const float umbra : {0.0f, 0.1f, 0.45f, 0.9f}) {
-      for (const float sun : {0.0f, 0.4f, 1.0f}) {
-        for (const float sky : {0.3f, 1.0f}) {
-          const PlaneTerms t = inPlaneTerms({sun, sky}, umbra, planes);
-          EXPECT_NEAR(planes * t.sky + (1.0f - planes) * t.sun, umbra * sky + (1.0f - umbra) * sun,
-                      1e-5);
-          EXPECT_TRUE(t.sun >= 0.0f && t.sun <= 1.0f && t.sky >= 0.0f && t.sky <= 1.0f);
-        }
-      }
-    }
-  }
-}
-
 // In the sun's absence nothing but the sky lights them.
 TEST(PlaceRelief, WallsThatTurnAwayTakeTheSkysShadeAlone) {
   const Eigen::Vector3f behind = Eigen::Vector3f(0.0f, 0.7f, 0.7f).normalized();
@@ -299,9 +260,6 @@ TEST(PlaceRelief, WallsThatTurnAwayTakeTheSkysShadeAlone) {
   EXPECT_NEAR((relief.walls[0].normal - Eigen::Vector3f(0, -1, 0)).norm(), 0.0, 1e-3);
   EXPECT_EQ(turnedAway(relief, behind).at<std::uint8_t>(25, 20), 255);
   EXPECT_EQ(cv::countNonZero(turnedAway(findRelief(Room().surfaces(), kSun), kSun)), 0);
-  const PlaneTerms half = inPlaneTerms({1.0f, 0.5f}, 1.0f, 0.4f);
-  EXPECT_NEAR(half.sun, 0.5f, 1e-5);
-  EXPECT_NEAR(half.sky, 0.5f, 1e-5);
 }
 
 TEST(ReliefSky, IsHiddenFromAWallByWhatIsNearItAlone) {

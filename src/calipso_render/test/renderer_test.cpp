@@ -199,7 +199,7 @@ TEST(Renderer, AMovingObjectHidesTheSkyOnce) {
   clip.add(frameWithBall(model));
   auto prepared = std::make_shared<Prepared>(prepare(clip, {model}, params()));
   prepared->moves[0] = true, prepared->light.light = sunlight();
-  prepared->umbra = cv::Vec3f::all(0.5f), prepared->shadowless.release();
+  prepared->umbra.setTo(cv::Scalar::all(128)), prepared->shadowless.release();
   ObjectInFrame ball;
   ball.name = "ball", ball.edited = true, ball.world_from_object = moved.world_from_object;
   for (const Eigen::Vector3f& x : prepared->surfaces[0].key_vertices)

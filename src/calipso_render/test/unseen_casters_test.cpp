@@ -97,11 +97,12 @@ TEST_F(UnseenCasters, AreNoneWhereAllShadowsDarken) {
 // With a quarter left in the shade and half the sun hidden, 0.625 are seen: 0.4 of it are 0.25.
 TEST(LowestSun, LeavesWhatTheFullShadeWould) {
   const cv::Mat hidden = (cv::Mat_<std::uint8_t>(1, 3) << 0, 128, 255);
-  const cv::Mat sun = lowestSun(hidden, 0.25f);
+  const cv::Mat sun = lowestSun(hidden, cv::Mat(1, 3, CV_8U, cv::Scalar(64)));
   EXPECT_EQ(sun.at<std::uint8_t>(0), 0);
   EXPECT_NEAR(0.25 + 0.75 * sun.at<std::uint8_t>(1) / 255.0, 0.4, 0.005);
   EXPECT_EQ(sun.at<std::uint8_t>(2), 255);
-  EXPECT_EQ(lowestSun(hidden, 0.0f).at<std::uint8_t>(2), 255);  // black in the shade
+  const cv::Mat black = cv::Mat::zeros(1, 3, CV_8U);
+  EXPECT_EQ(lowestSun(hidden, black).at<std::uint8_t>(2), 255);
 }
 
 }  // namespace

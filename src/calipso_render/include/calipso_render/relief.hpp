@@ -15,7 +15,6 @@ struct Relief {
 
   cv::Mat seen;              // CV_8UC1: 255 where it is seen; the others mean nothing elsewhere
   cv::Mat position, normal;  // CV_32FC3, world
-  cv::Mat umbra;             // CV_32FC1: what the sun's absence leaves of its brightness
   cv::Mat wall;   // CV_8UC1: the wall that it is part of, from 1 on; 0: none, it is curved
   cv::Mat tiles;  // CV_8UC1, one per square of kTile px: 255 where any of it is seen
   Eigen::AlignedBox3f box;  // of all positions
@@ -43,12 +42,5 @@ struct Relief {
 // The relief as another picture has it. @param map CV_32FC2: where the other's pixels lie in this
 // view
 Relief warped(const Relief& relief, const cv::Mat& map);
-
-// A relief's light in the terms of the support planes, so that `planes_umbra` makes of these levels
-// what its own umbra makes of its own.
-struct PlaneTerms {
-  float sun, sky;
-};
-PlaneTerms inPlaneTerms(const PlaneTerms& levels, float umbra, float planes_umbra);
 
 }  // namespace calipso::render

@@ -117,12 +117,13 @@ struct Prepared {
   Background background;
   cv::Mat plate_linear;  // CV_32FC3
   std::vector<PlateBeside> beside;
-  cv::Vec3f umbra = {0.4f, 0.4f,
-                     0.4f};  // what the sun's absence leaves of a support plane's brightness
+  // CV_8UC4: what the sun's absence leaves of the place's brightness, 255 all, of blue, green and red
+  // and of luminance
+  cv::Mat umbra;
   NoiseModel noise;
   float outline_blur = 0.0f;  // px: how much softer than a pixel the video's outlines are,
   float colour_blur = 0.0f;   // ... their colours beside their brightness
-  int blank_frames = 0;  // of the clip, which nothing was learnt from
+  int blank_frames = 0;       // of the clip, which nothing was learnt from
   int light_views = 1, texture_views = 1;  // frames that light and texture come from
   double background_ms = 0.0,
          appearance_ms = 0.0;        // wall time that plate, and light with appearances, took

@@ -18,11 +18,13 @@ constexpr float kDarkest = 0.05f;
 constexpr float kBrightest = 1.25f;  // times its light before, to which its own pixels still tell
 
 // The light on pixels of a row: levels now and before, 255 where a change is taken at all, where
-// the place comes to light, and how far the original's shadow is to be taken from the plate.
+// the place comes to light, and how far the original's shadow is to be taken from the plate; and
+// what of it no shade takes.
 struct LightLevels {
   static constexpr int kKinds = 7;
   enum Kind { kSun, kSunBefore, kSky, kSkyBefore, kTakes, kRemoved, kRelit };
   const std::uint8_t* of[kKinds];
+  const cv::Vec4b* umbra;
 };
 
 // What it makes of them.
@@ -35,15 +37,15 @@ struct LightFactors {
 };
 
 // Of eight pixels from the i-th on.
-CALIPSO_INLINE void findEightFactors(const LightLevels& levels, const cv::Vec3f& full_umbra, int i,
-                                     LightFactors& out) {
+CALIPSO_INLINE void findEightFactors(const LightLevels& levels, int i, LightFactors& out) {
   const auto at = [&](LightLevels::Kind kind) { return eightLevels(levels.of[kind] + i); };
   const Eight sun = at(LightLevels::kSun), sun_before = at(LightLevels::kSunBefore),
               sky = at(LightLevels::kSky), sky_before = at(LightLevels::kSkyBefore),
               takes = at(LightLevels::kTakes), removed = at(LightLevels::kRemoved), one = all(1.0f);
   eightAt(out.from_plate + i) = removed > 0.0f ? one : at(LightLevels::kRelit) * kPerLevel;
   for (int c = 0; c < 3; ++c) {
-    const float umbra = full_umbra[c] * kPerLevel, lit = kPerLevel - umbra;
+    const Eight umbra = eightUmbras(levels.umbra + i, c) * (kPerLevel * kPerLevel),
+                lit = kPerLevel - umbra;
     const Eight now = takes > 0.0f ? umbra * sky + lit * sun : one,
                 before = umbra * sky_before + lit * sun_before;
     eightAt(out.now[c] + i) = now;
@@ -52,18 +54,19 @@ CALIPSO_INLINE void findEightFactors(const LightLevels& levels, const cv::Vec3f&
 }
 
 // @return whether anything is taken from the plate
-CALIPSO_WIDE_LOOPS bool findLightFactors(const LightLevels& levels, const cv::Vec3f& umbra,
-                                         int count, LightFactors& out) {
+CALIPSO_WIDE_LOOPS bool findLightFactors(const LightLevels& levels, int count, LightFactors& out) {
   int i = 0;
-  for (; i + 8 <= count; i += 8) findEightFactors(levels, umbra, i, out);
+  for (; i + 8 <= count; i += 8) findEightFactors(levels, i, out);
   if (i < count) {
     std::uint8_t rest[LightLevels::kKinds][LightFactors::kMost] = {};
-    LightLevels last;
+    cv::Vec4b umbra[LightFactors::kMost];
+    LightLevels last{{}, umbra};
+    std::copy(levels.umbra + i, levels.umbra + count, umbra + i);
     for (int k = 0; k < LightLevels::kKinds; ++k) {
       std::copy(levels.of[k] + i, levels.of[k] + count, rest[k] + i);
       last.of[k] = rest[k];
     }
-    findEightFactors(last, umbra, i, out);
+    findEightFactors(last, i, out);
   }
   float most = 0.0f;
   for (int k = 0; k < count; ++k) most = std::max(most, out.from_plate[k]);
@@ -160,9 +163,11 @@ Pixel Backdrop::shadowedAt(int u, int v, bool removed) const {
             sun_before = light_.sunBefore().at<std::uint8_t>(at);
   const int sky = light_.sky().at<std::uint8_t>(at),
             sky_before = light_.skyBefore().at<std::uint8_t>(at);
-  const cv::Vec3f now = shadowRatio(frame_.prepared.umbra, kPerLevel * sun, kPerLevel * sky),
-                  before = shadowRatio(frame_.prepared.umbra, kPerLevel * sun_before,
-                                       kPerLevel * sky_before);
+  const cv::Vec4b& umbra = place_.umbra.at<cv::Vec4b>(v, u);
+  cv::Vec3f now, before;
+  for (int c = 0; c < 3; ++c)
+    now[c] = shadowRatio(umbra[c], sun, sky),
+    before[c] = shadowRatio(umbra[c], sun_before, sky_before);
   if (removed) {
     behind.colour = behind.colour.mul(now);
     return behind;
@@ -215,8 +220,9 @@ void Backdrop::composeRelit(int v, int first, int last, Row& row) const {
   LightFactors factors;
   const bool wants_plate = findLightFactors(
       {{rowOf(light_.sun()), rowOf(light_.sunBefore()), rowOf(light_.sky()),
-        rowOf(light_.skyBefore()), rowOf(light_.takes()), rowOf(removed_), rowOf(light_.relit())}},
-      frame_.prepared.umbra, count, factors);
+        rowOf(light_.skyBefore()), rowOf(light_.takes()), rowOf(removed_), rowOf(light_.relit())},
+       place_.umbra.ptr<cv::Vec4b>(v) + u},
+      count, factors);
   std::copy_n(factors.from_plate, count, &row.colour[3][first]);
   if (!wants_plate) {  // which is not even read then
     darken(factors, frame, count, colour);

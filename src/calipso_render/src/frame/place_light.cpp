@@ -27,12 +27,13 @@ constexpr float kSameSky = (kSameLevels - 2.1f) * kPerLevel,
 // The light on pixels of a row, levels, and where it is taken at all.
 struct LightChange {
   const std::uint8_t *sun, *sun_before, *sky, *sky_before, *takes;
+  const cv::Vec4b* umbra;
 };
 
 // changesOfLight() of eight pixels from the i-th on, where it is more than a pixel can follow.
-// @param umbra per level
-CALIPSO_INLINE EightBytes eightChanges(const LightChange& at, float umbra, int i) {
-  const Eight more_sky = eightLevels(at.sky + i) - eightLevels(at.sky_before + i),
+CALIPSO_INLINE EightBytes eightChanges(const LightChange& at, int i) {
+  const Eight umbra = eightUmbras(at.umbra + i, 3) * (kPerLevel * kPerLevel),
+              more_sky = eightLevels(at.sky + i) - eightLevels(at.sky_before + i),
               more_sun = eightLevels(at.sun + i) - eightLevels(at.sun_before + i),
               soft = smaller(larger(more_sky, all(-kSoftSky)), all(kSoftSky)),
               by = umbra * (more_sky - soft) + (kPerLevel - umbra) * more_sun;
@@ -40,10 +41,9 @@ CALIPSO_INLINE EightBytes eightChanges(const LightChange& at, float umbra, int i
 }
 
 // The same of `count` pixels.
-CALIPSO_WIDE_LOOPS void findChanges(const LightChange& at, float umbra, int count,
-                                    std::uint8_t* out) {
+CALIPSO_WIDE_LOOPS void findChanges(const LightChange& at, int count, std::uint8_t* out) {
   for (int i = 0; i + 8 <= count; i += 8) {
-    const EightBytes changes = eightChanges(at, umbra, i);
+    const EightBytes changes = eightChanges(at, i);
     std::memcpy(out + i, &changes, 8);
   }
   const int done = count / 8 * 8, more = count - done;
@@ -51,7 +51,9 @@ CALIPSO_WIDE_LOOPS void findChanges(const LightChange& at, float umbra, int coun
   std::uint8_t rest[5][8] = {};
   const std::uint8_t* const from[] = {at.sun, at.sun_before, at.sky, at.sky_before, at.takes};
   for (int k = 0; k < 5; ++k) std::copy_n(from[k] + done, more, rest[k]);
-  const EightBytes changes = eightChanges({rest[0], rest[1], rest[2], rest[3], rest[4]}, umbra, 0);
+  cv::Vec4b umbra[8];
+  std::copy_n(at.umbra + done, more, umbra);
+  const EightBytes changes = eightChanges({rest[0], rest[1], rest[2], rest[3], rest[4], umbra}, 0);
   std::memcpy(out + done, &changes, more);
 }
 
@@ -186,8 +188,6 @@ void PlaceLight::measureRun(const SkyGrid& sky_grid, int v, int begin, int end) 
   takeReliefSky(place_.view.relief(), moved_.on_walls, v, begin, end, sky);
   resting_.leaveHidden(v, begin, end, sky);
   resting_.addOthersSun(v, begin, end, sun);
-  takeReliefInPlaneTerms(place_.view.relief(), luminance(frame_.prepared.umbra), v, begin, end, sun,
-                         sky);
   veilLevels(place_.veil, v, begin, end, sun), veilLevels(place_.veil, v, begin, end, sky);
 }
 
@@ -233,10 +233,11 @@ void PlaceLight::findChange(int v, int from, int to, std::uint8_t* out) const {
   };
   const std::uint8_t *sun = rowOf(sun_), *sun_before = rowOf(sun_before_), *sky = rowOf(sky_),
                      *sky_before = rowOf(sky_before_), *takes = rowOf(takes_);
-  const float umbra = kPerLevel * luminance(frame_.prepared.umbra);
+  const cv::Vec4b* umbra = place_.umbra.ptr<cv::Vec4b>(v);
   sun_changes_.visitRow(v, from, to, [&](int begin, int end) {
-    findChanges({sun + begin, sun_before + begin, sky + begin, sky_before + begin, takes + begin},
-                umbra, end - begin, out + begin - from);
+    findChanges({sun + begin, sun_before + begin, sky + begin, sky_before + begin, takes + begin,
+                 umbra + begin},
+                end - begin, out + begin - from);
   });
 }
 

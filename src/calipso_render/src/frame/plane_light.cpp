@@ -349,17 +349,4 @@ void takeReliefSky(const Relief& relief, const ReliefSky& on_walls, int v, int b
     sky[k] = lightLevel(skyLight(on_walls.at(begin + k, v)));
 }
 
-void takeReliefInPlaneTerms(const Relief& relief, float planes_umbra, int v, int begin, int end,
-                            std::uint8_t* sun, std::uint8_t* sky) {
-  if (relief.empty()) return;
-  const float* umbra = relief.umbra.ptr<float>(v) + begin;
-  const std::uint8_t* seen = relief.seen.ptr<std::uint8_t>(v) + begin;
-  const int count = end - begin;
-  for (int k = nextMarked(seen, 0, count); k < count; k = nextMarked(seen, k + 1, count)) {
-    const PlaneTerms terms =
-        inPlaneTerms({kPerLevel * sun[k], kPerLevel * sky[k]}, umbra[k], planes_umbra);
-    sun[k] = lightLevel(terms.sun), sky[k] = lightLevel(terms.sky);
-  }
-}
-
 }  // namespace calipso::render

@@ -38,10 +38,17 @@ inline std::uint8_t bothLevels(std::uint8_t a, std::uint8_t b) {
   return static_cast<std::uint8_t>((product + (product >> 8)) >> 8);
 }
 
-// Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
-// @param umbra what the sun's absence leaves of it
-inline cv::Vec3f shadowRatio(const cv::Vec3f& umbra, float sun, float sky) {
-  return umbra * sky + (cv::Vec3f(1, 1, 1) - umbra) * sun;
+// Part of its brightness that a place keeps when it sees these levels of sun and sky.
+// @param umbra level: what the sun's absence leaves of it
+inline float shadowRatio(int umbra, int sun, int sky) {
+  return kPerLevel * kPerLevel * static_cast<float>(umbra * sky + (255 - umbra) * sun);
+}
+
+// A channel of eight pixels of Prepared::umbra, levels; the fourth is luminance.
+CALIPSO_INLINE Eight eightUmbras(const cv::Vec4b* at, int channel) {
+  EightInts umbras;
+  std::memcpy(&umbras, at, sizeof(umbras));
+  return __builtin_convertvector(umbras >> 8 * channel & 0xff, Eight);
 }
 
 // How much a change of brightness by `by` calls for the plate: 0 not visible .. 255 only it.
@@ -63,13 +70,6 @@ CALIPSO_INLINE EightBytes changesOfLight(const Eight& by) {
 // @param sky columns [begin, end) of row v
 void takeReliefSky(const Relief& relief, const ReliefSky& on_walls, int v, int begin, int end,
                    std::uint8_t* sky);
-
-// Levels of the relief in the terms of the support planes: what its levels do to the planes they do
-// not do to it.
-// @param planes_umbra luminance() of the planes' umbra
-// @param sun, sky columns [begin, end) of row v
-void takeReliefInPlaneTerms(const Relief& relief, float planes_umbra, int v, int begin, int end,
-                            std::uint8_t* sun, std::uint8_t* sky);
 
 // Takes the veil that haze lays over the place, which nothing shades, off what levels darken.
 // @param veil CV_8UC1, whole picture; may be empty

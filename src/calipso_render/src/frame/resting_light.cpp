@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
-#include "calipso_render/colour.hpp"
 #include "calipso_render/sky_map.hpp"
 #include "draw/wide_loops.hpp"
 #include "frame/mask_morphology.hpp"
@@ -40,16 +39,6 @@ cv::Mat skyLevels(const SkyGrid& grid, const SeenPlace& place, const Visibility&
     takeReliefSky(place.view.relief(), on_walls, v, 0, size.width, levels.ptr<std::uint8_t>(v));
   }
   return levels;
-}
-
-// Part of its brightness that a pixel loses which gets these levels of sun and sky.
-float darkeningAt(const PlaceView& view, const cv::Vec3f& umbra, int u, int v, std::uint8_t sun,
-                  std::uint8_t sky) {
-  if (view.relief().at(u, v)) {
-    const float own = view.relief().umbra.at<float>(v, u);
-    return own * (1.0f - kPerLevel * sky) + (1.0f - own) * (1.0f - kPerLevel * sun);
-  }
-  return 1.0f - luminance(shadowRatio(umbra, kPerLevel * sun, kPerLevel * sky));
 }
 
 }  // namespace
@@ -138,7 +127,7 @@ void RestingLight::findShaded(const StagedFrame& frame, const SeenPlace& place) 
       const float clear =
           place.veil.empty() ? 1.0f : 1.0f - kPerLevel * place.veil.at<std::uint8_t>(v, u);
       shaded_.at<std::uint8_t>(v, u) =
-          changeOfLight(clear * darkeningAt(place.view, frame.prepared.umbra, u, v, sun, sky));
+          changeOfLight(clear * (1.0f - shadowRatio(place.umbra.at<cv::Vec4b>(v, u)[3], sun, sky)));
     }
   }
   cv::dilate(shaded_, shaded_, disc(frame.params.background.shadow_margin_px));
@@ -148,7 +137,6 @@ void RestingLight::findShaded(const StagedFrame& frame, const SeenPlace& place) 
 // Sun and sky before the edit, and where light is taken at all.
 void RestingLight::join(const StagedFrame& frame, const SeenPlace& place) {
   const cv::Size size = frame.input.bgr.size();
-  const float umbra = luminance(frame.prepared.umbra);
   sun_before_.create(size, CV_8U), takes_.create(size, CV_8U);
   sky_before_ = originals_sky_levels_.clone();
 #pragma omp parallel for schedule(static)
@@ -156,7 +144,6 @@ void RestingLight::join(const StagedFrame& frame, const SeenPlace& place) {
     std::uint8_t *sun = sun_before_.ptr<std::uint8_t>(v), *sky = sky_before_.ptr<std::uint8_t>(v);
     joinSun(place, v);
     leaveHidden(v, 0, size.width, sky);
-    takeReliefInPlaneTerms(place.view.relief(), umbra, v, 0, size.width, sun, sky);
     veilLevels(place.veil, v, 0, size.width, sun), veilLevels(place.veil, v, 0, size.width, sky);
   }
 }

@@ -42,7 +42,8 @@ void SeenPlace::driftTo(const StagedFrame& frame) {
 void SeenPlace::takeKeyView(const StagedFrame& frame) {
   const Prepared& prepared = frame.prepared;
   live = prepared.background.live.empty() ? nullptr : &prepared.background.live;
-  shadowless = prepared.shadowless, sunless = prepared.sunless, veil = prepared.veil;
+  shadowless = prepared.shadowless, sunless = prepared.sunless;
+  umbra = prepared.umbra, veil = prepared.veil;
   view = PlaceView(view.planes(), prepared.relief);
   for (std::size_t i = 0; i < fronts.size(); ++i) {
     if (prepared.fronts[i].empty() || (prepared.moves[i] && !frame.at_rest[i])) continue;
@@ -67,6 +68,8 @@ void SeenPlace::warp(const StagedFrame& frame) {
   if (!prepared.sunless.empty())
     cv::remap(prepared.sunless, sunless, from_key, cv::noArray(), cv::INTER_NEAREST,
               cv::BORDER_CONSTANT, cv::Scalar(0));
+  cv::remap(prepared.umbra, umbra, from_key, cv::noArray(), cv::INTER_NEAREST,
+            cv::BORDER_REPLICATE);
   if (!prepared.veil.empty())
     cv::remap(prepared.veil, veil, from_key, cv::noArray(), cv::INTER_NEAREST,
               cv::BORDER_REPLICATE);

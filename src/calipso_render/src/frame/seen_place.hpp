@@ -24,6 +24,7 @@ struct SeenPlace {
   cv::Mat spread_beside;
   cv::Mat shadowless;  // Prepared::shadowless
   cv::Mat sunless;     // Prepared::sunless
+  cv::Mat umbra;       // Prepared::umbra
   cv::Mat veil;        // Prepared::veil
   // From the key frame's camera alone; elsewhere empty
   std::vector<cv::Mat> fronts;      // Prepared::fronts

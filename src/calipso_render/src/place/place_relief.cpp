@@ -4,29 +4,11 @@
 #include <cmath>
 #include <optional>
 
-#include "calipso_render/colour.hpp"
-
 namespace calipso::render {
 namespace {
 
 constexpr float kLeastSlope = 0.05f;  // cosine between normal and sun of what is lit
-constexpr float kFullShade = 0.15f;   // of the sun
-constexpr std::size_t kFewest = 50;   // px
-constexpr float kDark = 0.01f;        // linear
 constexpr float kOther = 1.05f;       // times as near as relief beside it: another part of it
-constexpr float kNoShade = 0.9f;      // hardly darker: the shade was not where it was predicted
-
-float brightness(const cv::Vec3f& code) {
-  return luminance(
-      {linearFromRealCode(code[0]), linearFromRealCode(code[1]), linearFromRealCode(code[2])});
-}
-
-// Sun over ambient light that a surface facing so gets.
-float sunShare(const Light& light, const Eigen::Vector3f& normal) {
-  const float shaded = luminance(diffuseShading(light, normal, 0.0f)),
-              lit = luminance(diffuseShading(light, normal, 1.0f));
-  return (lit - shaded) / std::max(shaded, 1e-4f);
-}
 
 // Of the pixels beside one that are set in a mask the one about as near as `nearness`.
 std::optional<cv::Point> nearestBeside(const cv::Mat& scenery, const cv::Mat& mask, float nearness,
@@ -93,40 +75,6 @@ cv::Mat turnedAway(const Relief& relief, const Eigen::Vector3f& sun) {
     }
   }
   return away;
-}
-
-void findUmbra(const Light& light, const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& sun,
-               const cv::Mat& labels, const std::vector<SupportPlane>& planes,
-               const cv::Vec3f& umbra, Relief& relief) {
-  if (relief.empty()) return;
-  relief.umbra = cv::Mat(relief.seen.size(), CV_32F, cv::Scalar(1.0f));
-  const float own = luminance(umbra),
-              of_planes = sunShare(
-                  light, planes.empty() ? Eigen::Vector3f::UnitZ()
-                                        : Eigen::Vector3f(planes.front().normal.cast<float>()));
-  std::vector<float> scales;  // of the sun's share, seen over predicted
-  for (int v = 0; v < relief.seen.rows; ++v) {
-    for (int u = 0; u < relief.seen.cols; ++u) {
-      if (!relief.at(u, v)) continue;
-      const Eigen::Vector3f normal = relief.receiver(u, v).normal;
-      const float share = sunShare(light, normal), lit = brightness(plate.at<cv::Vec3f>(v, u));
-      relief.umbra.at<float>(v, u) = share;
-      if (sun.at<float>(v, u) > kFullShade || labels.at<std::uint8_t>(v, u) != 0 || lit < kDark)
-        continue;
-      const float ratio = brightness(picture.at<cv::Vec3f>(v, u)) / lit;
-      scales.push_back((1.0f / std::clamp(ratio, 0.05f, 1.0f) - 1.0f) / share);
-    }
-  }
-  float scale = of_planes > 0.0f ? (1.0f / own - 1.0f) / of_planes : 1.0f;
-  if (scales.size() >= kFewest) {
-    std::nth_element(scales.begin(), scales.begin() + scales.size() / 2, scales.end());
-    const float seen = scales[scales.size() / 2];
-    if (seen > 1.0f / kNoShade - 1.0f) scale = seen;
-  }
-  for (int v = 0; v < relief.seen.rows; ++v) {
-    float* row = relief.umbra.ptr<float>(v);
-    for (int u = 0; u < relief.seen.cols; ++u) row[u] = 1.0f / (1.0f + scale * row[u]);
-  }
 }
 
 }  // namespace calipso::render

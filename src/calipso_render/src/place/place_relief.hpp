@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "calipso_render/inpaint.hpp"
-#include "calipso_render/light.hpp"
 #include "calipso_render/relief.hpp"
 
 namespace calipso::render {
@@ -74,15 +73,5 @@ void addRims(const cv::Mat& scenery, const cv::Mat& depth, Relief& relief);
 
 // CV_8UC1: 255 where it faces away from the sun.
 cv::Mat turnedAway(const Relief& relief, const Eigen::Vector3f& sun);
-
-// What the sun's absence leaves of the relief: from how bright it is in the objects' full shade
-// where that is seen, else as the light has it for a surface that faces so, on the scale of the
-// support planes.
-// @param picture, plate CV_32FC3, code values, with the shade and without
-// @param sun CV_32FC1, its visible part
-// @param umbra what the sun's absence leaves of the support planes
-void findUmbra(const Light& light, const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& sun,
-               const cv::Mat& labels, const std::vector<SupportPlane>& planes,
-               const cv::Vec3f& umbra, Relief& relief);
 
 }  // namespace calipso::render

@@ -62,23 +62,9 @@ Relief warped(const Relief& relief, const cv::Mat& map) {
     cv::remap(from, to, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT);
   };
   carry(relief.seen, out.seen), carry(relief.position, out.position),
-      carry(relief.normal, out.normal), carry(relief.umbra, out.umbra),
-      carry(relief.wall, out.wall);
+      carry(relief.normal, out.normal), carry(relief.wall, out.wall);
   out.index();
   return out;
-}
-
-PlaneTerms inPlaneTerms(const PlaneTerms& levels, float umbra, float planes_umbra) {
-  // planes_umbra sky' + (1 - planes_umbra) sun' = umbra + (1 - umbra) sun, one of the two levels
-  // being that of the planes
-  const float open = umbra + (1.0f - umbra) * levels.sun;
-  const PlaneTerms under_open_sky =
-      umbra <= planes_umbra
-          ? PlaneTerms{levels.sun, levels.sun + (1.0f - levels.sun) * umbra / planes_umbra}
-          : PlaneTerms{(open - planes_umbra) / (1.0f - planes_umbra), 1.0f};
-  // What objects hide of the sky goes off both.
-  const float left = open > 0.0f ? (open - umbra * (1.0f - levels.sky)) / open : 0.0f;
-  return {left * under_open_sky.sun, left * under_open_sky.sky};
 }
 
 }  // namespace calipso::render

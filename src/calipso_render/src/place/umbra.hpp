@@ -5,34 +5,70 @@
 
 #include "calipso_render/background.hpp"
 #include "calipso_render/light.hpp"
+#include "calipso_render/relief.hpp"
 #include "calipso_render/stage.hpp"
-#include "light/shadow_clue.hpp"
+#include "place/passing_shade.hpp"
 
 namespace calipso::render {
 
-struct SeenUmbra {
-  std::optional<cv::Vec3f> umbra;  // per channel; nullopt where too little of shadows is seen
-  bool refuted = false;            // it is no darker where they should be
+// A place that objects shade fully: linear, in the light and shaded, as if all of the sky were seen.
+struct ShadedSpot {
+  cv::Point at;  // px, key frame
+  cv::Vec3f lit, shaded;
 };
 
-// What the sun's absence leaves of a support plane's brightness, from the places that the views'
-// objects are known to shade: the median of picture over plate, what the objects hide of the sky
-// taken off. @param unseen what else keeps the sun off them
-SeenUmbra umbraInViews(const std::vector<View>& views, const std::vector<SupportPlane>& planes,
-                       const EmptyPlace& place, const Light& light, const Visibility& unseen);
+// Those that the key frame shows, against what is made of the place.
+// @param picture, plate CV_32FC3, code values @param sun, sky CV_32FC1, visible parts of them
+// @param unknown CV_8UC1, != 0: neither
+std::vector<ShadedSpot> shadedInPicture(const cv::Mat& picture, const cv::Mat& plate,
+                                        const cv::Mat& sun, const cv::Mat& sky,
+                                        const cv::Mat& unknown);
+
+// What the sun's absence leaves of brightness, per channel.
+struct SeenUmbra {
+  std::optional<cv::Vec3f> umbra;  // the median; nullopt: too few spots, or not all channels darker
+  bool refuted = false;            // it is no darker where they should be
+};
+SeenUmbra umbraAt(const std::vector<ShadedSpot>& spots);
 
 // What the light itself says of that, on the first plane.
 cv::Vec3f predictedUmbra(const Light& light, const std::vector<SupportPlane>& planes);
-
-// Median of picture / plate per channel over pixels of the full shadow, where all of the sky would
-// be seen; `predicted` if there are too few.
-// @param sun, sky CV_32FC1, visible parts of them on the support planes
-cv::Vec3f umbraInPicture(const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& sun,
-                         const cv::Mat& sky, const cv::Mat& labels, const cv::Vec3f& predicted);
 
 // The same from shadows that pass over the plate: the dark end of what darkens it.
 cv::Vec3f umbraOfPassing(const std::vector<ClipFrame>& frames,
                          const std::vector<SupportPlane>& planes, const Background& background,
                          const cv::Vec3f& predicted);
+
+// The support planes, as the key frame's camera sees them, and the relief.
+class UmbraSurfaces {
+ public:
+  // @param relief must outlive this
+  UmbraSurfaces(const std::vector<SupportPlane>& planes, const Relief& relief,
+                const Camera& camera);
+
+  // Those of them on support planes.
+  std::vector<ShadedSpot> onSupports(const std::vector<ShadedSpot>& spots) const;
+
+  // Places that the views' objects are known to shade, against what was seen of them without.
+  // @param receiver what of the place takes shade, of the key frame's pixels
+  // @param unseen what else keeps the sun off it
+  std::vector<ShadedSpot> shadedInViews(const std::vector<View>& views, const ReceiverOf& receiver,
+                                        const Background& seen, const Light& light,
+                                        const Visibility& unseen) const;
+
+  // Prepared::umbra: of each support plane its own, where its spots tell that, else the shared one;
+  // of relief what the light has for a surface that faces so, on the scale of the relief's spots, or
+  // else of the shared one, in the hue of that.
+  cv::Mat umbra(const std::vector<ShadedSpot>& spots, const cv::Vec3f& shared,
+                const Light& light) const;
+
+ private:
+  float scaleOnRelief(const std::vector<ShadedSpot>& on_relief, float shared,
+                      const Light& light) const;
+
+  cv::Mat numbers_;  // CV_8UC1: of the support planes, from 1 on
+  std::vector<SupportPlane> planes_;
+  const Relief& relief_;
+};
 
 }  // namespace calipso::render

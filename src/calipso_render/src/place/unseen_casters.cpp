@@ -201,12 +201,12 @@ CastersShade unseenCastersShade(const cv::Mat& told, const cv::Mat& plate, const
   return Surfaces(told, plate, surface).find();
 }
 
-cv::Mat lowestSun(const cv::Mat& hidden, float umbra) {
+cv::Mat lowestSun(const cv::Mat& hidden, const cv::Mat& umbra) {
   // umbra + (1 - umbra) level = umbra / (umbra + (1 - umbra) (1 - hidden))
-  cv::Mat part, level;
-  umbra = std::max(umbra, kLeastUmbra);
-  hidden.convertTo(part, CV_32F, umbra / 255.0);
-  cv::divide(part, 1.0 - (1.0 / umbra - 1.0) * part, level, 255.0);
+  cv::Mat part, left, level;
+  hidden.convertTo(part, CV_32F, 1.0 / 255.0), umbra.convertTo(left, CV_32F, 1.0 / 255.0);
+  left = cv::max(left, kLeastUmbra);
+  cv::divide(left.mul(part), 1.0 - (1.0 - left).mul(part), level, 255.0);
   level.convertTo(level, CV_8U);
   return level;
 }

@@ -22,7 +22,7 @@ struct CastersShade {
 CastersShade unseenCastersShade(const cv::Mat& told, const cv::Mat& plate, const cv::Mat& surface);
 
 // CV_8UC1: lightLevel() of the sun below which no shade brings a place that part of the sun is hidden
-// from anyhow. @param umbra what the sun's absence leaves of its brightness
-cv::Mat lowestSun(const cv::Mat& hidden, float umbra);
+// from anyhow. @param umbra CV_8UC1: what the sun's absence leaves of its brightness, 255 all
+cv::Mat lowestSun(const cv::Mat& hidden, const cv::Mat& umbra);
 
 }  // namespace calipso::render
