@@ -287,7 +287,7 @@ void findUmbra(const PlaceEvidence& e, const Haze& haze, const ReceiverOf& recei
     predicted = umbraOfPassing(e.frames, params.planes, p.background, predicted);
   if (moves && shared.refuted && !p.light.confirmed())  // what moves casts none under this sun
     p.sunless = cv::Mat(p.shadowless.size(), CV_8U, cv::Scalar(255));
-  p.umbra = surfaces.umbra(spots, shared.umbra.value_or(predicted), light);
+  p.umbra = surfaces.umbra(spots, moves, shared.umbra.value_or(predicted), light, p.plate_linear);
 }
 
 // What drifts before the camera takes no shadows; the plate has it where the key frame does.

@@ -127,6 +127,7 @@ struct UmbraOfRoom : ::testing::Test {
   Light light;  // even ambient light
   const cv::Rect on_wall{110, 20, 20, 20}, on_floor{10, 90, 20, 20};
   const cv::Vec3f shared{0.5f, 0.5f, 0.5f};
+  cv::Mat plate = cv::Mat(kHigh, kWide, CV_32FC3, cv::Scalar::all(0.5));
 
   UmbraOfRoom() { light.direction = kSun; }
 
@@ -152,8 +153,8 @@ TEST_F(UmbraOfRoom, IsEachSupportPlanesOwn) {
   const cv::Vec3f floor(0.5f, 0.4f, 0.35f), wall(0.25f, 0.2f, 0.15f);
   std::vector<ShadedSpot> spots;
   shade(on_floor, floor, spots), shade(on_wall, wall, spots);
-  const cv::Mat found =
-      UmbraSurfaces(floorAndWall(), kNoRelief, roomCamera()).umbra(spots, shared, light);
+  const cv::Mat found = UmbraSurfaces(floorAndWall(), kNoRelief, roomCamera())
+                            .umbra(spots, false, shared, light, plate);
   expectUmbra(found, floor, {80, 110});
   expectUmbra(found, wall, {25, 20});
   int edge = 0;
@@ -165,8 +166,9 @@ TEST_F(UmbraOfRoom, IsMeasuredOnWalls) {
   const cv::Vec3f wall(0.3f, 0.3f, 0.3f);
   std::vector<ShadedSpot> spots;
   shade(on_wall, wall, spots);
-  expectUmbra(UmbraSurfaces(floorPlane(), relief, roomCamera()).umbra(spots, shared, light), wall,
-              {25, 20});
+  expectUmbra(
+      UmbraSurfaces(floorPlane(), relief, roomCamera()).umbra(spots, false, shared, light, plate),
+      wall, {25, 20});
 }
 
 TEST_F(UmbraOfRoom, IsTheSharedOneOnSupportsThatShowNoShade) {
@@ -174,19 +176,59 @@ TEST_F(UmbraOfRoom, IsTheSharedOneOnSupportsThatShowNoShade) {
   std::vector<ShadedSpot> spots;
   shade({110, 20, 5, 5}, {0.8f, 0.8f, 0.8f}, spots);  // too few
   const UmbraSurfaces surfaces(floorAndWall(), kNoRelief, roomCamera());
-  expectUmbra(surfaces.umbra(spots, shared, light), shared, {25, 20});
+  expectUmbra(surfaces.umbra(spots, false, shared, light, plate), shared, {25, 20});
   shade(on_wall, wall, spots);
   shade(on_floor, {1.0f, 1.0f, 1.0f}, spots);  // it is not there
-  const cv::Mat found = surfaces.umbra(spots, shared, light);
+  const cv::Mat found = surfaces.umbra(spots, false, shared, light, plate);
   expectUmbra(found, wall, {25, 20});
   expectUmbra(found, shared, {80, 110});
+}
+
+// Dark and bright tiles, on which gloss adds the same in the shade.
+TEST_F(UmbraOfRoom, LeavesWhatGlossAdds) {
+  const cv::Vec3f part(0.4f, 0.3f, 0.25f);
+  const float gloss = 0.02f;
+  const auto spotsOn = [&](float dark, float bright) {
+    std::vector<ShadedSpot> spots;
+    for (int v = on_floor.y; v < on_floor.br().y; ++v) {
+      for (int u = on_floor.x; u < on_floor.br().x; ++u) {
+        const cv::Vec3f lit = cv::Vec3f::all((u / 4 + v / 4) % 2 == 0 ? dark : bright);
+        spots.push_back({{u, v}, lit, part.mul(lit) + cv::Vec3f::all(gloss)});
+      }
+    }
+    return spots;
+  };
+  const cv::Point dark_place(80, 110), bright_place(90, 110);
+  plate.at<cv::Vec3f>(dark_place) = cv::Vec3f::all(0.1f),
+  plate.at<cv::Vec3f>(bright_place) = cv::Vec3f::all(0.8f);
+  const UmbraSurfaces surfaces(floorPlane(), kNoRelief, roomCamera());
+  const cv::Mat found = surfaces.umbra(spotsOn(0.1f, 0.6f), true, shared, light, plate);
+  expectUmbra(found, part + cv::Vec3f::all(gloss / 0.1f), dark_place);
+  expectUmbra(found, part + cv::Vec3f::all(gloss / 0.8f), bright_place);
+  // Tiles much alike do not tell it, nor does what is filled in the light.
+  for (const bool seen_lit : {true, false}) {
+    const std::vector<ShadedSpot> spots = seen_lit ? spotsOn(0.4f, 0.5f) : spotsOn(0.1f, 0.6f);
+    const cv::Mat even = surfaces.umbra(spots, seen_lit, shared, light, plate);
+    EXPECT_EQ(even.at<cv::Vec4b>(dark_place), even.at<cv::Vec4b>(bright_place));
+  }
+}
+
+// What is darker beside an even ratio than it says is no gloss.
+TEST_F(UmbraOfRoom, OfWhatIsMattIsOneRatio) {
+  std::vector<ShadedSpot> spots;
+  for (int u = 10; u < 110; ++u) {
+    const cv::Vec3f lit = cv::Vec3f::all(u < 60 ? 0.1f : 0.6f);
+    spots.push_back(
+        {{u, 110}, lit, cv::Vec3f(0.4f, 0.3f, 0.25f).mul(lit) - cv::Vec3f(0.01f, 0, 0)});
+  }
+  EXPECT_FALSE(glossyUmbra(spots));
 }
 
 // As much sun as ambient light on the floor; on the wall it comes under another angle.
 TEST_F(UmbraOfRoom, FollowsFromTheSharedOneOnWallsThatShowNoShade) {
   const UmbraSurfaces surfaces(floorPlane(), relief, roomCamera());
   const float wall = 1.0f / (1.0f + -kSun.y() / kSun.z());
-  expectUmbra(surfaces.umbra({}, shared, light), {wall, wall, wall}, {25, 20});
+  expectUmbra(surfaces.umbra({}, false, shared, light, plate), {wall, wall, wall}, {25, 20});
 }
 
 // What stands before a support plane, which the depth image shows, does not tell of that.

@@ -22,6 +22,7 @@ constexpr float kDark = 0.01f;       // linear; what is darker says nothing of i
 constexpr float kDarkest = 0.1f;     // the least that is left
 constexpr std::size_t kFewest = 50;  // spots that tell
 constexpr float kNoShadow = 0.85f;   // hardly darker: the shadow was not where it was predicted
+constexpr float kRange = 1.5f;       // from the dark to the bright spots that tell gloss
 constexpr int kEdge = 4;             // px: where planes meet
 
 template <typename Spots, typename Value>
@@ -108,6 +109,43 @@ SeenUmbra umbraAt(const std::vector<ShadedSpot>& spots) {
   return {umbra, false};
 }
 
+cv::Vec3f PlaneUmbra::at(const cv::Vec3f& lit) const {
+  cv::Vec3f left = part;
+  for (int c = 0; c < 3 && gloss > 0.0f; ++c)
+    left[c] = std::min(part[c] + gloss / std::max(lit[c], kDark), 1.0f);
+  return left;
+}
+
+// In each colour a line through the medians of the darkest and the brightest third (Tukey 1977)
+// leaves what mirrors no more than that at black; gloss has no hue, so the least of them counts.
+std::optional<PlaneUmbra> glossyUmbra(const std::vector<ShadedSpot>& spots) {
+  PlaneUmbra found{{}, 1.0f};
+  for (int c = 0; c < 3; ++c) {
+    std::vector<ShadedSpot> sorted = spots;
+    std::sort(sorted.begin(), sorted.end(),
+              [c](const ShadedSpot& a, const ShadedSpot& b) { return a.lit[c] < b.lit[c]; });
+    const std::ptrdiff_t third = sorted.size() / 3;
+    const auto middle = [&](auto begin, const auto& member) {
+      return median(std::vector<ShadedSpot>(begin, begin + third),
+                    [&](const ShadedSpot& s) { return std::optional((s.*member)[c]); });
+    };
+    const auto dark = middle(sorted.begin(), &ShadedSpot::lit),
+               bright = middle(sorted.end() - third, &ShadedSpot::lit),
+               shaded_dark = middle(sorted.begin(), &ShadedSpot::shaded),
+               shaded_bright = middle(sorted.end() - third, &ShadedSpot::shaded);
+    if (!dark || *bright < kRange * std::max(*dark, kDark)) return std::nullopt;
+    const float rise = (*shaded_bright - *shaded_dark) / (*bright - *dark);
+    found.gloss = std::min(found.gloss, *shaded_dark - rise * *dark);
+  }
+  if (found.gloss <= 0.0f) return std::nullopt;
+  std::vector<ShadedSpot> matt = spots;
+  for (ShadedSpot& s : matt) s.shaded -= cv::Vec3f::all(found.gloss);
+  const auto part = umbraAt(matt).umbra;
+  if (!part) return std::nullopt;
+  found.part = *part;
+  return found;
+}
+
 UmbraSurfaces::UmbraSurfaces(const std::vector<SupportPlane>& planes, const Relief& relief,
                              const Camera& camera)
     : numbers_(cv::Mat::zeros(camera.height, camera.width, CV_8U)),
@@ -168,30 +206,53 @@ std::vector<ShadedSpot> UmbraSurfaces::shadedInViews(const std::vector<View>& vi
   return spots;
 }
 
-cv::Mat UmbraSurfaces::umbra(const std::vector<ShadedSpot>& spots, const cv::Vec3f& shared,
-                             const Light& light) const {
-  std::vector<std::vector<ShadedSpot>> of(planes_.size() + 1);
-  std::vector<ShadedSpot> on_relief;
-  for (const ShadedSpot& s : spots) {
-    of[numbers_.at<std::uint8_t>(s.at)].push_back(s);
-    if (relief_.at(s.at.x, s.at.y)) on_relief.push_back(s);
+// Of each plane.
+std::vector<PlaneUmbra> UmbraSurfaces::planesUmbras(const std::vector<ShadedSpot>& spots,
+                                                    bool seen_lit, const cv::Vec3f& shared) const {
+  std::vector<std::vector<ShadedSpot>> of(planes_.size());
+  for (const ShadedSpot& s : onSupports(spots))
+    of[numbers_.at<std::uint8_t>(s.at) - 1].push_back(s);
+  std::vector<PlaneUmbra> umbras;
+  for (const std::vector<ShadedSpot>& own : of) {
+    const auto umbra = umbraAt(own).umbra;
+    const auto glossy = umbra && seen_lit ? glossyUmbra(own) : std::nullopt;
+    umbras.push_back(glossy.value_or(PlaneUmbra{umbra.value_or(shared)}));
   }
-  std::vector<cv::Vec3f> own = {shared};
-  for (std::size_t k = 1; k < of.size(); ++k) own.push_back(umbraAt(of[k]).umbra.value_or(shared));
+  return umbras;
+}
+
+cv::Mat UmbraSurfaces::umbra(const std::vector<ShadedSpot>& spots, bool seen_lit,
+                             const cv::Vec3f& shared, const Light& light,
+                             const cv::Mat& plate) const {
+  std::vector<ShadedSpot> on_relief;
+  std::copy_if(spots.begin(), spots.end(), std::back_inserter(on_relief),
+               [this](const ShadedSpot& s) { return relief_.at(s.at.x, s.at.y); });
   const float scale = scaleOnRelief(on_relief, luminance(shared), light);
-  cv::Mat out(numbers_.size(), CV_8UC4);
+  cv::Mat out(numbers_.size(), CV_8UC4, levels(shared));
   for (int v = 0; v < out.rows; ++v) {
     for (int u = 0; u < out.cols; ++u) {
-      const auto sun = [&] { return scale * sunShare(light, relief_.receiver(u, v).normal); };
-      out.at<cv::Vec4b>(v, u) = levels(relief_.at(u, v) ? inHueOf(shared, 1.0f / (1.0f + sun()))
-                                                        : own[numbers_.at<std::uint8_t>(v, u)]);
+      if (!relief_.at(u, v)) continue;
+      const float sun = scale * sunShare(light, relief_.receiver(u, v).normal);
+      out.at<cv::Vec4b>(v, u) = levels(inHueOf(shared, 1.0f / (1.0f + sun)));
     }
   }
   // Which of two planes is seen where they meet is not sure: a line brighter than the shade of both
   // would stand out.
-  cv::Mat darker;
-  cv::erode(out, darker, cv::Mat::ones(2 * kEdge + 1, 2 * kEdge + 1, CV_8U));
-  darker.copyTo(out, numbers_);
+  out.setTo(cv::Scalar::all(255), numbers_);
+  const std::vector<PlaneUmbra> umbras = planesUmbras(spots, seen_lit, shared);
+  for (std::size_t k = 0; k < umbras.size(); ++k) {
+    cv::Mat near;
+    cv::dilate(numbers_ == k + 1, near, cv::Mat::ones(2 * kEdge + 1, 2 * kEdge + 1, CV_8U));
+    near &= numbers_ != 0;
+    for (int v = 0; v < out.rows; ++v) {
+      for (int u = 0; u < out.cols; ++u) {
+        if (near.at<std::uint8_t>(v, u) == 0) continue;
+        cv::Vec4b& at = out.at<cv::Vec4b>(v, u);
+        const cv::Vec4b own = levels(umbras[k].at(plate.at<cv::Vec3f>(v, u)));
+        for (int c = 0; c < 4; ++c) at[c] = std::min(at[c], own[c]);
+      }
+    }
+  }
   return out;
 }
 

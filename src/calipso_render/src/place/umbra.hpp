@@ -39,6 +39,18 @@ cv::Vec3f umbraOfPassing(const std::vector<ClipFrame>& frames,
                          const std::vector<SupportPlane>& planes, const Background& background,
                          const cv::Vec3f& predicted);
 
+// A plane's shade, in which  part lit + gloss  is left of a colour: no shadow takes what gloss adds.
+struct PlaneUmbra {
+  cv::Vec3f part;
+  float gloss = 0.0f;
+
+  // What is left of the brightness, per channel.
+  cv::Vec3f at(const cv::Vec3f& lit) const;
+};
+
+// nullopt: the spots do not tell gloss, as they are much alike, or matt. @pre all were seen lit
+std::optional<PlaneUmbra> glossyUmbra(const std::vector<ShadedSpot>& spots);
+
 // The support planes, as the key frame's camera sees them, and the relief.
 class UmbraSurfaces {
  public:
@@ -59,10 +71,13 @@ class UmbraSurfaces {
   // Prepared::umbra: of each support plane its own, where its spots tell that, else the shared one;
   // of relief what the light has for a surface that faces so, on the scale of the relief's spots, or
   // else of the shared one, in the hue of that.
-  cv::Mat umbra(const std::vector<ShadedSpot>& spots, const cv::Vec3f& shared,
-                const Light& light) const;
+  // @param plate CV_32FC3, linear @param seen_lit all spots were, none is filled
+  cv::Mat umbra(const std::vector<ShadedSpot>& spots, bool seen_lit, const cv::Vec3f& shared,
+                const Light& light, const cv::Mat& plate) const;
 
  private:
+  std::vector<PlaneUmbra> planesUmbras(const std::vector<ShadedSpot>& spots, bool seen_lit,
+                                       const cv::Vec3f& shared) const;
   float scaleOnRelief(const std::vector<ShadedSpot>& on_relief, float shared,
                       const Light& light) const;
 
