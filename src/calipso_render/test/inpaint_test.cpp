@@ -4,10 +4,12 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "fill/band_turns.hpp"
 #include "fill/patch_fill.hpp"
 #include "fill/seam_blend.hpp"
 #include "fill/seam_cut.hpp"
@@ -163,6 +165,15 @@ TEST(PatchOrigins, DoNotDependOnTheNumberOfThreads) {
     EXPECT_EQ(cv::norm(origin, first, cv::NORM_INF), 0.0) << count;
   }
   omp_set_num_threads(threads);
+}
+
+TEST(SweepBands, FindTheBandsBesideThemAsOnOneThread) {
+  std::vector<std::atomic<int>> visits(9);
+  sweepBands(9, 3, [&](int band, int sweep) {
+    ++visits[band];
+    for (int other = std::max(0, band - 1); other <= std::min(8, band + 1); ++other)
+      EXPECT_EQ(visits[other], sweep + (other == band || band % 2 == 1)) << band << ' ' << other;
+  });
 }
 
 // So little of it that coarser levels have no patch of it to begin with.

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "fill/band_turns.hpp"
 #include "fill/patch_cost.hpp"
 #include "fill/patch_levels.hpp"
 #include "fill/patch_sources.hpp"
@@ -137,15 +138,10 @@ class Filling {
       cost_.at<float>(p) = rules_.distance(image_, lively_, p, match(p), 1e30f);
       plain_.at<std::uint8_t>(p) = 255;
     });
-    for (int s = 0; s < kSweeps; ++s) {
-      ++sweep_;
-      // Bands beside each other never at the same time: they read each other's rims.
-      for (int first = 0; first < 2; ++first) {
-#pragma omp parallel for schedule(dynamic, 1)
-        for (int b = first; b < static_cast<int>(bands_.size()); b += 2)
-          changes[b] += searchBand(bands_[b], sweep_ % 2 == 0, reach);
-      }
-    }
+    sweepBands(static_cast<int>(bands_.size()), kSweeps, [&](int b, int sweep) {
+      changes[b] += searchBand(bands_[b], sweep_ + 1 + sweep, reach);
+    });
+    sweep_ += kSweeps;
     std::size_t all = 0;
     for (const auto& band : bands_) all += band.size();
     return static_cast<float>(std::accumulate(changes.begin(), changes.end(), 0)) /
@@ -225,7 +221,8 @@ class Filling {
     }
   }
 
-  int searchBand(const std::vector<cv::Point>& band, bool backwards, int reach) {
+  int searchBand(const std::vector<cv::Point>& band, int sweep, int reach) {
+    const bool backwards = sweep % 2 == 0;
     const int step = backwards ? 1 : -1;
     int changed = 0;
     for (std::size_t i = 0; i < band.size(); ++i) {
@@ -234,7 +231,7 @@ class Filling {
         if (inside(p + d) && hasMatch(p + d)) attempt(p, match(p + d) - d, 1.0f);
       }
       for (int r = reach; r >= 1; r /= 2) {
-        const cv::Point q = match(p) + jitter(p, r, r);
+        const cv::Point q = match(p) + random_.offset(p, r, sweep, r);
         attempt(p, rules_.onPattern(p, q), kJump);
       }
       changed += match(p) != before;
