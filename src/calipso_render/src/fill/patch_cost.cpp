@@ -50,7 +50,7 @@ PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const P
       places_(level.hole.total()),
       scale_(scale),
       horizon_(horizon),
-      pattern_(&pattern),
+      pattern_(pattern.shrunk(scale, level.hole.rows)),
       repeats_(pattern.lattice || !pattern.periods.empty()),
       away_row_(params.away_row),
       away_column_(params.away_column),
@@ -112,12 +112,6 @@ float PatchCost::partialDistance(const cv::Mat& image, const cv::Point& p, const
   return part * sums.sum() + away;
 }
 
-cv::Point PatchCost::onPattern(const cv::Point& p, const cv::Point& q) const {
-  if (!repeats_) return q;
-  const auto whole = pattern_->nearest(rowOf(p), scale_ * cv::Point2f(q - p));
-  return whole ? p + cv::Point(cvRound(whole->x / scale_), cvRound(whole->y / scale_)) : q;
-}
-
 // Places are layered: what is at another height is seldom the same, what is of another surface
 // never.
 inline float PatchCost::awayCost(const cv::Point& p, const cv::Point& q) const {
@@ -130,7 +124,7 @@ inline float PatchCost::awayCost(const cv::Point& p, const cv::Point& q) const {
     cost += away_farther_ * (own.nearness / other.nearness - kAsNear);
   if (differ(own.surface, other.surface)) cost += kMisplaced;
   if (differ(own.sky, other.sky)) cost += kMisplaced;
-  if (repeats_ && offPattern(p, q) > kOffPattern) cost += kMisplaced;
+  if (repeats_ && isOffPattern(p, q)) cost += kMisplaced;
   if (!colours_.empty()) cost += off_colour_ * offColour(p, q);
   return kPatchSide * kPatchSide * cost;
 }
@@ -144,11 +138,10 @@ inline float PatchCost::blandCost(const cv::Mat& lively, const cv::Point& p,
   return kPatchSide * kPatchSide * off_bland_ * std::max(lack * std::abs(lack), -most * most);
 }
 
-// px of this level by which a shift misses the pattern
-float PatchCost::offPattern(const cv::Point& p, const cv::Point& q) const {
-  const cv::Point2f fine = scale_ * cv::Point2f(q - p);
-  const auto whole = pattern_->nearest(rowOf(p), fine);
-  return whole ? static_cast<float>(cv::norm(fine - *whole)) / scale_ : 0.0f;
+inline bool PatchCost::isOffPattern(const cv::Point& p, const cv::Point& q) const {
+  const cv::Point2f shift(q - p);
+  const auto whole = pattern_.nearest(p.y, shift);
+  return whole && (shift - *whole).dot(shift - *whole) > kOffPattern * kOffPattern;
 }
 
 // Squared code values by which a copy would be off its place's colour.

@@ -30,7 +30,7 @@ class PatchCost {
  public:
   // @param scale   size of the level's pixels in those of the finest
   // @param horizon difference of nearness that does not count
-  // @param pattern px of the finest level; must outlive this
+  // @param pattern px of the finest level
   PatchCost(const FillLevel& level, float scale, float horizon, const Pattern& pattern,
             const InpaintParams& params);
 
@@ -43,7 +43,10 @@ class PatchCost {
                         const std::vector<int>& seen, float bound) const;
 
   // The place nearest to q from which p can be copied by a shift of the pattern; q without one.
-  cv::Point onPattern(const cv::Point& p, const cv::Point& q) const;
+  cv::Point onPattern(const cv::Point& p, const cv::Point& q) const {
+    const auto whole = repeats_ ? pattern_.nearest(p.y, q - p) : std::nullopt;
+    return whole ? p + cv::Point(cvRound(whole->x), cvRound(whole->y)) : q;
+  }
 
   // Label of the surface at a place; 0 unknown.
   int surfaceAt(const cv::Point& p) const { return at(p).surface; }
@@ -65,11 +68,9 @@ class PatchCost {
   };
 
   const Known& at(const cv::Point& p) const { return places_[p.y * columns_ + p.x]; }
-  // Of the finest level.
-  int rowOf(const cv::Point& p) const { return cvRound(scale_ * (p.y + 0.5f) - 0.5f); }
   inline float awayCost(const cv::Point& p, const cv::Point& q) const;
   inline float blandCost(const cv::Mat& lively, const cv::Point& p, const cv::Point& q) const;
-  float offPattern(const cv::Point& p, const cv::Point& q) const;
+  inline bool isOffPattern(const cv::Point& p, const cv::Point& q) const;
   float offColour(const cv::Point& p, const cv::Point& q) const;
 
   int columns_;
@@ -78,8 +79,8 @@ class PatchCost {
   // counts
   cv::Mat colours_, expected_;
   float scale_, horizon_;
-  const Pattern* pattern_;
-  bool repeats_;  // the pattern knows any shifts
+  Pattern pattern_;  // of this level
+  bool repeats_;     // the pattern knows any shifts
   // as InpaintParams'
   float away_row_, away_column_, away_farther_, off_colour_, off_bland_;
 };

@@ -20,6 +20,19 @@ struct Pattern {
     if (row < 0 || row >= static_cast<int>(periods.size()) || periods[row] <= 0.0f) return {};
     return cv::Point2f(periods[row] * std::round(shift.x / periods[row]), shift.y);
   }
+
+  // That of the same picture, so many times smaller.
+  Pattern shrunk(float scale, int rows) const {
+    Pattern small = *this;
+    if (lattice) small.lattice = Lattice{(1.0f / scale) * lattice->basis, scale * lattice->inverse};
+    if (periods.empty()) return small;
+    small.periods.assign(rows, 0.0f);
+    for (int row = 0; row < rows; ++row) {
+      const int fine = cvRound(scale * (static_cast<float>(row) + 0.5f) - 0.5f);
+      if (fine < static_cast<int>(periods.size())) small.periods[row] = periods[fine] / scale;
+    }
+    return small;
+  }
 };
 
 }  // namespace calipso::render
