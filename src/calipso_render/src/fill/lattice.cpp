@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "draw/side_by_side.hpp"
 #include "fill/levelled.hpp"
 #include "place/masked_quantile.hpp"
 
@@ -53,10 +54,12 @@ class Correlation {
     const cv::Mat flat = patternOf(image, known);
     const cv::Size padded(cv::getOptimalDFTSize(image.cols + kFarthest),
                           cv::getOptimalDFTSize(image.rows + kFarthest));
-    const cv::Mat f = transformed(flat, padded), f2 = transformed(flat.mul(flat), padded),
-                  m = transformed(weight, padded);
-    const cv::Mat product = correlated(f, f), squares = correlated(m, f2),
-                  shifted = correlated(f2, m), count = correlated(m, m);
+    cv::Mat f, f2, m, product, squares, shifted, count;
+    doAll(true, {[&] { f = transformed(flat, padded); },
+                 [&] { f2 = transformed(flat.mul(flat), padded); },
+                 [&] { m = transformed(weight, padded); }});
+    doAll(true, {[&] { product = correlated(f, f); }, [&] { squares = correlated(m, f2); },
+                 [&] { shifted = correlated(f2, m); }, [&] { count = correlated(m, m); }});
     const float least = kOverlap * static_cast<float>(cv::countNonZero(known));
     ncc_ = cv::Mat(kFarthest + 1, 2 * kFarthest + 1, CV_32F, cv::Scalar(kUnjudged));
     for (int v = 0; v <= kFarthest; ++v) {
