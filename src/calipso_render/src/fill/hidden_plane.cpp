@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "draw/side_by_side.hpp"
 #include "fill/around_hole.hpp"
 #include "fill/line_ends.hpp"
 #include "fill/row_periods.hpp"
@@ -56,9 +57,9 @@ std::optional<PlanePart> chartedPart(const HiddenPlane& plane) {
 void addLook(const cv::Mat& look, const cv::Mat& seen, PlanePart& part) {
   // What is not seen of the plane would shine through to what is.
   part.plain = smoothFill(look, seen == 0, seen);
-  part.look = part.chart.carried(part.plain);
-  smoothFill(part.look, part.known == 0, part.known).copyTo(part.look);
-  part.edges = straightEdges(part.source, part.look);
+  const cv::Mat carried = part.chart.carried(part.plain);
+  doAll(true, {[&] { part.edges = straightEdges(part.source, carried); },
+               [&] { part.look = smoothFill(carried, part.known == 0, part.known); }});
 }
 
 void addLattice(const cv::Mat& look, int margin, PlanePart& part) {
