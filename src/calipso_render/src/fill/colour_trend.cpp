@@ -87,19 +87,23 @@ cv::Mat colourTrend(const cv::Mat& image, const cv::Mat& known) {
 #pragma omp parallel for schedule(static, 1)
   for (int c = 0; c < 3; ++c) x[c] = fitted(samples, c);
   if (!(explained(samples, x) >= kExplains)) return trend;
+  cv::Vec3d low, middle, high;
   for (int c = 0; c < 3; ++c) {
     std::vector<double> values;  // of the trend where it is known
     for (const Sample& s : samples) values.push_back(x[c].dot(s.terms));
     std::sort(values.begin(), values.end());
     const std::size_t few =
         static_cast<std::size_t>(kExtremes * static_cast<double>(values.size()));
-    const double low = values[few], middle = values[values.size() / 2],
-                 high = values[values.size() - 1 - few];
+    low[c] = values[few], middle[c] = values[values.size() / 2],
+    high[c] = values[values.size() - 1 - few];
+  }
 #pragma omp parallel for schedule(static)
-    for (int v = 0; v < trend.rows; ++v) {
-      for (int u = 0; u < trend.cols; ++u)
-        trend.at<cv::Vec3f>(v, u)[c] = static_cast<float>(
-            std::clamp(x[c].dot(termsAt(u, v, image.size())), low, high) - middle);
+  for (int v = 0; v < trend.rows; ++v) {
+    for (int u = 0; u < trend.cols; ++u) {
+      const Terms terms = termsAt(u, v, image.size());
+      for (int c = 0; c < 3; ++c)
+        trend.at<cv::Vec3f>(v, u)[c] =
+            static_cast<float>(std::clamp(x[c].dot(terms), low[c], high[c]) - middle[c]);
     }
   }
   return trend;
