@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "draw/side_by_side.hpp"
+#include "fill/around_hole.hpp"
 
 namespace calipso::render {
 namespace {
@@ -60,8 +61,10 @@ PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const P
   if (off_colour_ > 0.0f) {
     // Wider in the hole: a spot at its rim does not tell what is there.
     const int around = std::max(kPatchSide, cvRound(kColourAround / scale));
+    const cv::Rect near = windowAround(level.hole, kPatchRadius, kPatchRadius);
+    expected_ = cv::Mat(level.image.size(), level.image.type());
     doAll(true, {[&] {
-                   cv::blur(level.image, expected_, {around, around});
+                   cv::blur(level.image(near), expected_(near), {around, around});
                  },
                  [&] {
                    cv::blur(level.image, colours_, {kPatchSide, kPatchSide});
@@ -125,7 +128,7 @@ inline float PatchCost::awayCost(const cv::Point& p, const cv::Point& q) const {
   if (differ(own.surface, other.surface)) cost += kMisplaced;
   if (differ(own.sky, other.sky)) cost += kMisplaced;
   if (repeats_ && isOffPattern(p, q)) cost += kMisplaced;
-  if (!colours_.empty()) cost += off_colour_ * offColour(p, q);
+  if (off_colour_ > 0.0f) cost += off_colour_ * offColour(p, q);
   return kPatchSide * kPatchSide * cost;
 }
 

@@ -75,8 +75,8 @@ class PatchCost {
 
   int columns_;
   std::vector<Known> places_;
-  // CV_32FC4, before the hole is filled: means over a patch, and far around it; empty if no colour
-  // counts
+  // CV_32FC4, before the hole is filled: means over a patch, and, near the hole, far around it; empty
+  // if no colour counts
   cv::Mat colours_, expected_;
   float scale_, horizon_;
   Pattern pattern_;  // of this level
