@@ -293,8 +293,10 @@ cv::Mat goesOnByPattern(const cv::Mat& repeats, const cv::Mat& known, const cv::
   cv::morphologyEx(other, other, cv::MORPH_OPEN, cv::Mat::ones(kCompared, kCompared, CV_8U));
   if (cv::countNonZero(other) == 0) return hole.clone();
   if (cv::countNonZero(repeats) == 0) return cv::Mat::zeros(hole.size(), CV_8U);
-  cv::distanceTransform(repeats == 0, to_repeats, cv::DIST_L2, cv::DIST_MASK_5);
-  cv::distanceTransform(other == 0, to_other, cv::DIST_L2, cv::DIST_MASK_5);
+  const auto distance = [](const cv::Mat& to, cv::Mat& px) {
+    cv::distanceTransform(to == 0, px, cv::DIST_L2, cv::DIST_MASK_5);
+  };
+  doAll(true, {[&] { distance(repeats, to_repeats); }, [&] { distance(other, to_other); }});
   return hole & (to_repeats < to_other);
 }
 
