@@ -27,17 +27,19 @@ struct RowSums {
   std::vector<float> product, squares, shifted, count;
 };
 
+// All shifts of a place at once, as they hang on nothing that another one's sum does.
 RowSums sumsOf(const float* values, const float* weight, int columns, int shifts) {
   RowSums sums(shifts);
-  for (int k = 0; k < shifts; ++k) {
-    float product = 0.0f, squares = 0.0f, shifted = 0.0f, count = 0.0f;
-    for (int u = 0; u + k < columns; ++u) {
-      const float a = values[u], b = values[u + k];
-      product += a * b, squares += a * a * weight[u + k], shifted += b * b * weight[u];
-      count += weight[u] * weight[u + k];
+  for (int u = 0; u < columns; ++u) {
+    const float a = values[u], known = weight[u];
+    if (known == 0.0f) continue;
+    float *product = sums.product.data(), *squares = sums.squares.data(),
+          *shifted = sums.shifted.data(), *count = sums.count.data();
+    for (int k = 0; k < std::min(shifts, columns - u); ++k) {
+      const float b = values[u + k], both = weight[u + k];
+      product[k] += a * b, squares[k] += a * a * both, shifted[k] += b * b * known;
+      count[k] += known * both;
     }
-    sums.product[k] = product, sums.squares[k] = squares, sums.shifted[k] = shifted,
-    sums.count[k] = count;
   }
   return sums;
 }
