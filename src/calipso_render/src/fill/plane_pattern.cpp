@@ -2,6 +2,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "draw/side_by_side.hpp"
 #include "fill/plane_chart.hpp"
 
 namespace calipso::render {
@@ -47,9 +48,11 @@ bool followPattern(const PatternedPlane& plane, const PictureToFill& picture, in
   const auto chart = planeChart(plane.to_plane, plane.hole, picture.source | picture.hole);
   if (!chart) return false;
   const cv::Mat known = chart->whole(picture.source), hole = chart->any(picture.hole),
-                look = chart->carried(picture.look), sample = chart->whole(plane.seen),
-                repeats = repeatsBy(plane.lattice, look, known, sample) &
-                          asLively(look, known, sample) & ~hole;
+                look = chart->carried(picture.look), sample = chart->whole(plane.seen);
+  cv::Mat repeats, lively;
+  doAll(true, {[&] { repeats = repeatsBy(plane.lattice, look, known, sample); },
+               [&] { lively = asLively(look, known, sample); }});
+  repeats &= lively & ~hole;
   cv::Mat seen, behind;
   cv::warpPerspective(repeats, seen, chart->to_picture, size, cv::INTER_NEAREST);
   cv::warpPerspective(goesOnByPattern(repeats, known, hole), behind, chart->to_picture, size,
