@@ -181,7 +181,7 @@ void takeUnseenCasters(const CastersShade& shade, const ReceiverOf& receiver, Pr
   cv::Mat known = shade.known & (p.shadowless == 0);
   if (!p.sunless.empty()) known &= p.sunless == 0;  // what is seen hides it there
   p.unseen_shade = UnseenShade(shade.hidden, known, receiver, p.light.light.direction);
-  addSunless(shade.hidden, p);
+  addSunless(hiddenOnRelief(shade, p.unseen_shade, p.relief), p);
 }
 
 // What the objects at rest leave on the place, to be taken out; what of it is mirrored goes to `p`.

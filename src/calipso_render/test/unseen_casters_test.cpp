@@ -2,12 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include "calipso_render/unseen_shade.hpp"
 #include "grain_pictures.hpp"
+#include "test_room.hpp"
 
 namespace calipso::render {
 namespace {
 
-using namespace testing;
+using testing::grain;
 
 // A wall and a floor below it, the left third of both in the shade of something that is not seen. A
 // shadow that passed over the wall's upper half told where it has the sun, but for noise.
@@ -92,6 +94,30 @@ TEST_F(UnseenCasters, AreNotKnownBesideSurfacesThatHaveBoth) {
 TEST_F(UnseenCasters, AreNoneWhereAllShadowsDarken) {
   told.setTo(kSun, told == kNoSun);
   EXPECT_TRUE(unseenCastersShade(told, plate, surface).hidden.empty());
+}
+
+// The wall's left half lies in a shade that is known there alone. What the sun shines past on its way
+// to that has none, either.
+TEST(HiddenOnRelief, IsHiddenFromThePlaceBehindItAlongTheSun) {
+  const Relief wall = findRelief(testing::Room().surfaces(), testing::kSun);
+  const cv::Mat none = cv::Mat::zeros(testing::kHigh, testing::kWide, CV_8U);
+  CastersShade shade{none.clone(), wall.seen.clone()};
+  shade.hidden.colRange(0, testing::kWide / 2).setTo(255);
+  const UnseenShade unseen(
+      shade.hidden, shade.known,
+      [&](int u, int v) {
+        return wall.at(u, v) ? std::optional(wall.receiver(u, v)) : std::nullopt;
+      },
+      testing::kSun);
+  Relief before = wall;  // nearer to the sun
+  before.position = wall.position + cv::Scalar(0.5 * testing::kSun.x(), 0.5 * testing::kSun.y(),
+                                               0.5 * testing::kSun.z());
+  shade.known.rowRange(0, 30).setTo(0);
+  const cv::Mat hidden = hiddenOnRelief({none, shade.known}, unseen, before);
+  EXPECT_GT(hidden.at<std::uint8_t>(15, 30), 250);
+  EXPECT_EQ(hidden.at<std::uint8_t>(15, 130), 0);
+  EXPECT_EQ(hidden.at<std::uint8_t>(40, 30), 0);  // brightness tells
+  EXPECT_EQ(cv::countNonZero(hidden & ~wall.seen), 0);
 }
 
 // With a quarter left in the shade and half the sun hidden, 0.625 are seen: 0.4 of it are 0.25.

@@ -24,6 +24,7 @@ constexpr double kOtherStep = 0.5, kOtherHue = 0.25;
 constexpr double kPenumbra = 2.5;  // px, deviation, where it is not measured
 constexpr int kWidest = 16;        // px on either side of a shade's border, over which it is soft
 constexpr double kFewestAcross = 50;  // px at a distance from the border that tell the light there
+constexpr float kFullSun = 0.9f;      // nothing is hidden
 constexpr float kLeastUmbra = 1e-3f;
 
 // Noise decides single pixels: what most around say, as they do.
@@ -199,6 +200,21 @@ class Surfaces {
 CastersShade unseenCastersShade(const cv::Mat& told, const cv::Mat& plate, const cv::Mat& surface) {
   if (told.empty() || cv::countNonZero(clearly(told, kNoSun, kSun)) < kFewest) return {};
   return Surfaces(told, plate, surface).find();
+}
+
+cv::Mat hiddenOnRelief(const CastersShade& shade, const Visibility& unseen, const Relief& relief) {
+  cv::Mat hidden = shade.hidden.clone();
+  for (int v = 0; v < hidden.rows; ++v) {
+    for (int u = 0; u < hidden.cols; ++u) {
+      if (!relief.at(u, v) || shade.known.at<std::uint8_t>(v, u) != 0) continue;
+      const Receiver r = relief.receiver(u, v);
+      const float sun = unseen.visibility(r.position, r.normal);
+      std::uint8_t& here = hidden.at<std::uint8_t>(v, u);
+      if (sun < kFullSun)
+        here = std::max(here, static_cast<std::uint8_t>(std::lround(255.0f * (1.0f - sun))));
+    }
+  }
+  return hidden;
 }
 
 cv::Mat lowestSun(const cv::Mat& hidden, const cv::Mat& umbra) {
