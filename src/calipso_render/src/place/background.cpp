@@ -57,6 +57,7 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
   // Of a shadow that stays, single pixels can have too little contrast to tell.
   cv::medianBlur(long_shaded, agreed, kAgree);
   agreed &= long_shaded == 0;
+#pragma omp parallel for schedule(dynamic, 8)
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) {
       if (agreed.at<std::uint8_t>(v, u) == 0) continue;

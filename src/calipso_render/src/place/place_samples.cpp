@@ -22,6 +22,19 @@ constexpr float kTintNoise = 0.05f;  // and added to it
 
 int brightness(const cv::Vec3b& c) { return c[0] + 2 * c[1] + c[2]; }
 
+// Equally bright ones as they were.
+Samples byBrightness(const Samples& values) {
+  std::vector<std::uint32_t> keys;
+  keys.reserve(values.size());
+  for (std::uint32_t i = 0; i < values.size(); ++i)
+    keys.push_back(static_cast<std::uint32_t>(brightness(values[i])) << 20 | i);
+  std::sort(keys.begin(), keys.end());
+  Samples sorted;
+  sorted.reserve(values.size());
+  for (const std::uint32_t key : keys) sorted.push_back(values[key & 0xfffff]);
+  return sorted;
+}
+
 // Where values in order of brightness fall apart best: the least sum of squares within two groups
 // (Otsu).
 std::size_t bestSplit(const Samples& sorted) {
@@ -46,11 +59,8 @@ double groupSpread(const Samples& sorted, std::size_t from, std::size_t to) {
 
 // Brightness without shade. A shadow that stays can hold most of the samples; two clear groups
 // that differ as shade does tell it, however few the bright ones are.
-double litBrightness(double step, Samples values) {
-  const auto darker = [](const cv::Vec3b& a, const cv::Vec3b& b) {
-    return brightness(a) < brightness(b);
-  };
-  std::stable_sort(values.begin(), values.end(), darker);
+double litBrightness(double step, const Samples& unsorted) {
+  const Samples values = byBrightness(unsorted);
   const std::size_t n = values.size(), split = bestSplit(values);
   const double usual = brightness(values[static_cast<std::size_t>(kLit * (n - 1))]);
   if (split < kFewestLit || n - split < kFewestLit) return usual;
@@ -92,6 +102,7 @@ PlaceSamples::PlaceSamples(const std::vector<ClipFrame>& frames, int margin) : f
 
 Samples PlaceSamples::at(int u, int v) const {
   Samples values;
+  values.reserve(frames_.size());
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     if (shows(i, u, v)) values.push_back(frames_[i].bgr.at<cv::Vec3b>(v, u));
   }
@@ -124,10 +135,7 @@ bool dropShaded(double step, Samples& values) {
 }
 
 void keepBrighter(Samples& values) {
-  const auto darker = [](const cv::Vec3b& a, const cv::Vec3b& b) {
-    return brightness(a) < brightness(b);
-  };
-  std::stable_sort(values.begin(), values.end(), darker);
+  values = byBrightness(values);
   values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(bestSplit(values)));
 }
 
