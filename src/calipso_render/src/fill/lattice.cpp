@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "draw/side_by_side.hpp"
+#include "fill/distances_to.hpp"
 #include "fill/levelled.hpp"
 #include "place/masked_quantile.hpp"
 
@@ -286,17 +287,14 @@ cv::Mat asLively(const cv::Mat& image, const cv::Mat& known, const cv::Mat& samp
 }
 
 cv::Mat goesOnByPattern(const cv::Mat& repeats, const cv::Mat& known, const cv::Mat& hole) {
-  cv::Mat other, to_repeats, to_other;
+  cv::Mat other;
   // Gaps in what is known belong to it.
   cv::morphologyEx(known, other, cv::MORPH_CLOSE, cv::Mat::ones(kCompared, kCompared, CV_8U));
   other &= (repeats == 0) & (hole == 0);
   cv::morphologyEx(other, other, cv::MORPH_OPEN, cv::Mat::ones(kCompared, kCompared, CV_8U));
   if (cv::countNonZero(other) == 0) return hole.clone();
   if (cv::countNonZero(repeats) == 0) return cv::Mat::zeros(hole.size(), CV_8U);
-  const auto distance = [](const cv::Mat& to, cv::Mat& px) {
-    cv::distanceTransform(to == 0, px, cv::DIST_L2, cv::DIST_MASK_5);
-  };
-  doAll(true, {[&] { distance(repeats, to_repeats); }, [&] { distance(other, to_other); }});
+  const auto [to_repeats, to_other] = distancesTo(repeats, other);
   return hole & (to_repeats < to_other);
 }
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "calipso_render/inpaint.hpp"
+#include "fill/distances_to.hpp"
 #include "place/crossing_planes.hpp"
 #include "place/key_cover.hpp"
 #include "place/place_relief.hpp"
@@ -283,9 +284,8 @@ void leaveToWhatRises(const cv::Mat& scenery, const cv::Mat& before,
                                      (scenery > (1.0f + kOffSupport) * plane),
                                  kRisesSide);
     if (cv::countNonZero(on) == 0 || cv::countNonZero(rises) == 0) continue;
-    cv::Mat to_on, to_rises, weight;
-    cv::distanceTransform(on == 0, to_on, cv::DIST_L2, cv::DIST_MASK_5);
-    cv::distanceTransform(rises == 0, to_rises, cv::DIST_L2, cv::DIST_MASK_5);
+    const auto [to_on, to_rises] = distancesTo(on, rises);
+    cv::Mat weight;
     rises.convertTo(weight, CV_32F, 1.0 / 255.0);
     surfaces.label.setTo(PlaceSurfaces::kUnknown, hidden & (surfaces.label == k + 1) &
                                                       (to_rises < to_on) &

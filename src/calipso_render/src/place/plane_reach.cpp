@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "fill/distances_to.hpp"
 #include "place/plane_outline.hpp"
 
 namespace calipso::render {
@@ -44,13 +45,11 @@ cv::Mat goesOn(const cv::Mat& plane, const cv::Mat& farthest, const cv::Mat& sce
   const cv::Mat known = (scenery > 0.0f) & (plane > 0.0f),
                 on = edge | (known & (scenery < (1.0f + kOnPlane) * plane) &
                              (scenery > (1.0f - kOnPlane) * farthest) & (taken == 0));
-  cv::Mat absent = (known & (scenery < kFarther * farthest) & (beyond == 0)) | nothing, to_on,
-          to_absent;
+  cv::Mat absent = (known & (scenery < kFarther * farthest) & (beyond == 0)) | nothing;
   cv::morphologyEx(absent, absent, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
   if (cv::countNonZero(on) == 0) return cv::Mat::zeros(plane.size(), CV_8U);
   if (cv::countNonZero(absent) == 0) return reachOf(on, kBeyond) & (plane > 0.0f);
-  cv::distanceTransform(on == 0, to_on, cv::DIST_L2, cv::DIST_MASK_5);
-  cv::distanceTransform(absent == 0, to_absent, cv::DIST_L2, cv::DIST_MASK_5);
+  const auto [to_on, to_absent] = distancesTo(on, absent);
   const cv::Mat within =
       withinOutlines(on, absent, to_on, to_absent, (scenery == 0.0f) & (nothing == 0));
   if (!within.empty()) return within & reachOf(on, kBeyondOutlined) & (plane > 0.0f);

@@ -2,6 +2,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "fill/distances_to.hpp"
+
 namespace calipso::render {
 namespace {
 
@@ -17,7 +19,7 @@ cv::Mat sureOf(const cv::Mat& label, const cv::Mat& hidden, const cv::Mat& seen,
   for (int k = 0; k < static_cast<int>(edges.size()); ++k) {
     const cv::Mat wanted = hidden & (label == k + 1);
     if (cv::countNonZero(wanted) == 0) continue;
-    cv::Mat on, other, to_on, to_other;  // of both what is large enough to be copied from
+    cv::Mat on, other;  // of both what is large enough to be copied from
     cv::morphologyEx(seen == k, on, cv::MORPH_OPEN, large, {-1, -1}, 1, cv::BORDER_REPLICATE);
     cv::morphologyEx(nothing | ((hidden == 0) & (seen != k)), other, cv::MORPH_OPEN, small,
                      {-1, -1}, 1, cv::BORDER_REPLICATE);
@@ -25,11 +27,7 @@ cv::Mat sureOf(const cv::Mat& label, const cv::Mat& hidden, const cv::Mat& seen,
       if (edges[k][j] != kApart) other.setTo(0, seen == j);
     }
     if (cv::countNonZero(on) == 0) continue;
-    cv::distanceTransform(~on, to_on, cv::DIST_L2, cv::DIST_MASK_5);
-    if (cv::countNonZero(other) > 0)
-      cv::distanceTransform(~other, to_other, cv::DIST_L2, cv::DIST_MASK_5);
-    else
-      to_other = cv::Mat(label.size(), CV_32F, cv::Scalar(1e9f));
+    const auto [to_on, to_other] = distancesTo(on, other);
     sure |= wanted & (to_on < to_other);
   }
   return sure;
