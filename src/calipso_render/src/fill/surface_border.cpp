@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "calipso_render/inpaint.hpp"
 
@@ -67,8 +69,14 @@ void setSides(const SurfaceBorder& border, const LineEnd& from, const LineEnd& t
   const Way way{from, to};
   const cv::Point2f start = from.at - from.length * way.along;
   const float length = from.length + way.gap + to.length;
-  for (int v = 0; v < surface.rows; ++v) {
-    for (int u = 0; u < surface.cols; ++u) {
+  constexpr int kMargin = kOff + 1;
+  const cv::Point2f stop = start + length * way.along;
+  const cv::Rect ends = cv::boundingRect(std::vector<cv::Point2f>{start, stop}),
+                 near = cv::Rect(ends.x - kMargin, ends.y - kMargin, ends.width + 2 * kMargin,
+                                 ends.height + 2 * kMargin) &
+                        cv::Rect({0, 0}, surface.size());
+  for (int v = near.y; v < near.br().y; ++v) {
+    for (int u = near.x; u < near.br().x; ++u) {
       std::uint8_t& label = surface.at<std::uint8_t>(v, u);
       const bool guess = hole.at<std::uint8_t>(v, u) != 0 && isGuess(label);
       if (label != border.left && label != border.right && !guess) continue;
