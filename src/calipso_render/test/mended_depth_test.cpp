@@ -65,6 +65,20 @@ TEST(MendedDepth, GapsBesideAnObjectAreNarrowToo) {
   EXPECT_EQ(missAt(mended, depth, object), 0.0);
 }
 
+// Between the rungs of a ladder that stands at a quay's edge water is seen, far below.
+TEST(MendedDepth, WhatIsSeenBetweenTheMembersOfALatticeStays) {
+  Table table;
+  cv::Mat depth = table.truth.clone();
+  const int edge = 110;
+  for (int v = 0; v < edge; ++v) depth.row(v) *= 1.5f;
+  for (int v = 60; v < edge + 12; v += 12) {
+    table.labels(cv::Rect(140, v, 40, 3)).setTo(1);
+    for (const int u : {140, 157, 177}) table.labels(cv::Rect(u, v, 3, 12)).setTo(1);
+  }
+  depth.setTo(0.4f, table.labels != 0);
+  EXPECT_EQ(cv::norm(table.mended(depth), depth, cv::NORM_INF), 0.0);
+}
+
 TEST(MendedDepth, ThingsAndWideGapsStay) {
   const Table table;
   const cv::Rect thing(100, 120, 14, 12), wide(180, 90, 90, 80);

@@ -48,6 +48,30 @@ cv::Mat passesThrough(const cv::Mat& off, const cv::Mat& on) {
   return through;
 }
 
+// The connected pieces of a mask around most of whose rim the plane is seen: what lies between the
+// members of a lattice that stands on it may be far behind.
+cv::Mat piecesAmong(const cv::Mat& plane, const cv::Mat& mask) {
+  cv::Mat pieces, found(mask.size(), CV_8U);
+  std::vector<int> rim(cv::connectedComponents(mask, pieces, 4, CV_32S), 0), on_plane = rim;
+  for (int v = 0; v < mask.rows; ++v) {
+    for (int u = 0; u < mask.cols; ++u) {
+      const int piece = pieces.at<int>(v, u);
+      if (piece == 0) continue;
+      for (const cv::Point& q : {cv::Point(u - 1, v), {u + 1, v}, {u, v - 1}, {u, v + 1}}) {
+        if (!cv::Rect({0, 0}, mask.size()).contains(q) || pieces.at<int>(q) == piece) continue;
+        ++rim[piece], on_plane[piece] += plane.at<std::uint8_t>(q) != 0 ? 1 : 0;
+      }
+    }
+  }
+  for (int v = 0; v < mask.rows; ++v) {
+    for (int u = 0; u < mask.cols; ++u) {
+      const int piece = pieces.at<int>(v, u);
+      found.at<std::uint8_t>(v, u) = piece != 0 && 2 * on_plane[piece] >= rim[piece] ? 255 : 0;
+    }
+  }
+  return found;
+}
+
 }  // namespace
 
 cv::Mat mendedDepth(const cv::Mat& depth, const cv::Mat& labels,
@@ -64,15 +88,16 @@ cv::Mat mendedDepth(const cv::Mat& depth, const cv::Mat& labels,
     if (!own.empty()) gap.setTo(0, isOn(own, depth));
   }
   if (cv::countNonZero(gap) == 0) return depth;
-  const cv::Mat through = passesThrough((depth - plane_depth) / depth, on);
+  const cv::Mat seen = on & ~passesThrough((depth - plane_depth) / depth, on);
   const int radius = cvRound(kGap * depth.cols);
   cv::Mat closed;
-  cv::copyMakeBorder((on & ~through) | (labels != 0), closed, radius, radius, radius, radius,
+  cv::copyMakeBorder(seen | (labels != 0), closed, radius, radius, radius, radius,
                      cv::BORDER_CONSTANT);
   cv::morphologyEx(closed, closed, cv::MORPH_CLOSE,
                    cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
   cv::Mat mended = depth.clone();
-  plane_depth.copyTo(mended, gap & closed(cv::Rect({radius, radius}, depth.size())));
+  gap &= closed(cv::Rect({radius, radius}, depth.size()));
+  plane_depth.copyTo(mended, piecesAmong(seen, gap));
   return mended;
 }
 
