@@ -74,6 +74,27 @@ TEST(PlaceDepth, FramesThatLookBehindAnObjectTellIt) {
   }
 }
 
+// Of waves, which look otherwise in every frame, no depth is told by agreement: they go on behind
+// the object, at their depth, and what stands before it does not.
+TEST(PlaceDepth, WhatMovesByItselfGoesOnAsBesideTheObject) {
+  std::vector<ClipFrame> clip = passingBy();
+  cv::RNG random(3);
+  for (ClipFrame& f : clip) {
+    cv::Mat waves(f.bgr.size(), CV_8UC3);
+    random.fill(waves, cv::RNG::NORMAL, 120.0, 12.0);
+    waves.copyTo(f.bgr, f.labels == 0);
+  }
+  cv::Mat depth = depthImage();
+  const cv::Rect crate(kObject.br().x, kObject.y + 12, 20, 40);
+  depth(crate).setTo(0.5f);
+  const cv::Mat nearness = placeNearness(clip, {}, depth, 2);
+  for (int v = kObject.y; v < kObject.br().y; ++v) {
+    for (int u = kObject.x; u < kObject.br().x; ++u)
+      ASSERT_FLOAT_EQ(nearness.at<float>(v, u), 1.0f / kWall) << u << ", " << v;
+  }
+  EXPECT_FLOAT_EQ(nearness.at<float>(crate.y + 5, crate.x), 2.0f);  // the object does not hide it
+}
+
 TEST(PlaceDepth, OtherFramesComeIntoTheKeyViewByIt) {
   const ClipFrame key = frameFrom(0.0), other = frameFrom(0.3);
   const cv::Mat nearness(kHigh, kWide, CV_32F, cv::Scalar(1.0f / kWall));

@@ -19,6 +19,7 @@ constexpr int kAround = 15;      // px of the square whose spread is compared
 constexpr float kNoSpread = 1e9f;
 // times the spread at another depth, and code values over it, that a support plane's may have
 constexpr float kAsWell = 1.3f, kNoise = 0.5f;
+constexpr float kOffPlane = 0.02f;     // part by which what is on a plane is nearer or farther
 constexpr float kBefore = 1.1f;        // times that what hides a place is nearer than it,
 constexpr float kLeastBefore = 1e-4f;  // 1/m
 
@@ -122,53 +123,89 @@ cv::Mat spreadOf(const std::vector<Sight>& sights, const Camera& key, const cv::
   return spread;
 }
 
-// Where a support plane goes on behind the objects: frames that show it agree about as well as at
-// any other depth. What no frame shows of it is as the nearest pixel of which they tell: there other
-// depths have no rival, however wrong.
-// @param least, plane CV_32FC1: spread at the best other depth, and at the plane's
-cv::Mat planeGoesOn(const cv::Mat& least, const cv::Mat& plane) {
-  const cv::Mat told = plane < kNoSpread;
-  if (cv::countNonZero(told) == 0) return cv::Mat::zeros(plane.size(), CV_8U);
-  const cv::Mat agrees = told & (plane <= kAsWell * least + kNoise);
-  cv::Mat away, nearest, goes_on(plane.size(), CV_8U);
-  cv::distanceTransform(told == 0, away, nearest, cv::DIST_L2, 5, cv::DIST_LABEL_PIXEL);
-  std::vector<std::uint8_t> by_label(told.total() + 1, 0);
-  for (int v = 0; v < told.rows; ++v) {
-    for (int u = 0; u < told.cols; ++u) {
-      if (told.at<std::uint8_t>(v, u) != 0)
-        by_label[nearest.at<int>(v, u)] = agrees.at<std::uint8_t>(v, u);
+// The values of the nearest pixels of `where`, which has some; those of `where` have their own.
+// @param values CV_32FC1
+cv::Mat ofNearest(const cv::Mat& values, const cv::Mat& where) {
+  cv::Mat away, nearest, out(values.size(), CV_32F);
+  cv::distanceTransform(where == 0, away, nearest, cv::DIST_L2, 5, cv::DIST_LABEL_PIXEL);
+  std::vector<float> by_label(where.total() + 1, 0.0f);
+  for (int v = 0; v < where.rows; ++v) {
+    for (int u = 0; u < where.cols; ++u) {
+      if (where.at<std::uint8_t>(v, u) != 0)
+        by_label[nearest.at<int>(v, u)] = values.at<float>(v, u);
     }
   }
-  for (int v = 0; v < told.rows; ++v) {
-    for (int u = 0; u < told.cols; ++u)
-      goes_on.at<std::uint8_t>(v, u) = by_label[nearest.at<int>(v, u)];
+  for (int v = 0; v < out.rows; ++v) {
+    for (int u = 0; u < out.cols; ++u) out.at<float>(v, u) = by_label[nearest.at<int>(v, u)];
   }
-  return goes_on;
+  return out;
 }
 
-// @param ground CV_32FC1: nearness of the support planes, 0 where none is
-void sweep(const std::vector<ClipFrame>& frames, const cv::Mat& hidden, const cv::Mat& ground,
-           int margin, cv::Mat& nearness) {
-  const cv::Rect box = cv::boundingRect(hidden);
+// Where a surface goes on behind the objects: frames that show it agree about as well as at any
+// other depth. What no frame shows of it is as the nearest pixel of which they tell: there other
+// depths have no rival, however wrong.
+// @param least, there CV_32FC1: spread at the best other depth, and at the surface's
+cv::Mat goesOn(const cv::Mat& least, const cv::Mat& there) {
+  const cv::Mat told = there < kNoSpread;
+  if (cv::countNonZero(told) == 0) return cv::Mat::zeros(there.size(), CV_8U);
+  cv::Mat agrees;
+  cv::Mat(there <= kAsWell * least + kNoise).convertTo(agrees, CV_32F);
+  return ofNearest(agrees, told) > 0.0f;
+}
+
+// How near the objects are, by the depth image: that of their nearest pixel of which it tells; empty
+// if it tells of none.
+cv::Mat objectsNearness(const cv::Mat& labels, const cv::Mat& depth) {
+  const cv::Mat told = (labels != 0) & (depth > 0.0f);
+  if (cv::countNonZero(told) == 0) return {};
+  return ofNearest(1.0f / depth, told);
+}
+
+// What is behind the objects, of several depths.
+struct Hidden {
+  cv::Mat where;   // CV_8UC1, the picture's size
+  cv::Mat limit;   // CV_32FC1: it is no nearer; may be empty
+  cv::Mat ground;  // CV_32FC1: nearness of the support planes, 0 where none is
+};
+
+// What lies beside the objects, as far away as they or farther, goes on behind them: the support
+// plane, or as near as the nearest such pixel.
+cv::Mat continued(const cv::Mat& nearness, const Hidden& hidden) {
+  cv::Mat beside = hidden.where == 0, on_plane;
+  if (!hidden.limit.empty()) beside &= nearness <= hidden.limit;
+  if (cv::countNonZero(beside) == 0) return nearness.clone();
+  cv::Mat out = ofNearest(nearness, beside);
+  const cv::Mat off_plane = cv::abs(nearness - hidden.ground) > kOffPlane * hidden.ground;
+  cv::Mat(off_plane == 0).convertTo(on_plane, CV_32F);
+  hidden.ground.copyTo(out, (ofNearest(on_plane, beside) > 0.0f) & (hidden.ground > 0.0f));
+  return out;
+}
+
+// What is beside the objects, else a support plane, is taken for what goes on behind them unless
+// another depth explains the frames better: in what moves by itself (waves), or has no texture, all
+// explain them about as well.
+void sweep(const std::vector<ClipFrame>& frames, const Hidden& hidden, int margin,
+           cv::Mat& nearness) {
+  const cv::Rect box = cv::boundingRect(hidden.where);
   const Camera& key = frames.front().camera;
   std::vector<Sight> sights;
   for (const ClipFrame& f : frames) sights.emplace_back(f, key, margin);
-  cv::Mat least(box.size(), CV_32F, cv::Scalar(kNoSpread)), best = nearness(box).clone();
-  for (const float depth : depthsAround(nearness, hidden)) {
+  const auto spreadAtDepths = [&](const cv::Mat& depths) {
+    cv::Mat spread = spreadOf(sights, key, hidden.where, box, depths);
+    if (!hidden.limit.empty()) spread.setTo(kNoSpread, depths > hidden.limit(box));
+    return spread;
+  };
+  cv::Mat least(box.size(), CV_32F, cv::Scalar(kNoSpread)),
+      best = continued(nearness, hidden)(box).clone();
+  const cv::Mat beside = best.clone(), plane = hidden.ground(box);
+  for (const float depth : depthsAround(nearness, hidden.where)) {
     const cv::Mat all(box.size(), CV_32F, cv::Scalar(depth));
-    const cv::Mat spread = spreadOf(sights, key, hidden, box, all), better = spread < least;
+    const cv::Mat spread = spreadAtDepths(all), better = spread < least;
     spread.copyTo(least, better), all.copyTo(best, better);
   }
-  cv::Mat known = hidden == 0;
-  const cv::Mat plane = ground(box),
-                on_plane =
-                    planeGoesOn(least, spreadOf(sights, key, hidden, box, plane)) & (plane > 0.0f);
-  plane.copyTo(best, on_plane);
-  best.copyTo(nearness(box), hidden(box));
-  known(box) |= on_plane | (least < kNoSpread);
-  cv::Mat weight;
-  known.convertTo(weight, CV_32F, 1.0 / 255.0);
-  pushPull(nearness, weight).copyTo(nearness, known == 0);
+  plane.copyTo(best, goesOn(least, spreadAtDepths(plane)) & (plane > 0.0f));
+  beside.copyTo(best, goesOn(least, spreadAtDepths(beside)));
+  best.copyTo(nearness(box), hidden.where(box));
 }
 
 // The key frame's pixels as another camera sees them.
@@ -229,9 +266,14 @@ cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<Su
       nearness.at<float>(v, u) = d > 0.0f ? 1.0f / d : ground.at<float>(v, u);
     }
   }
-  const cv::Mat hidden = grown(key.labels != 0, margin);
-  if (!depth.empty() && cv::countNonZero(hidden) > 0)
-    sweep(frames, hidden, ground, margin, nearness);
+  Hidden hidden{grown(key.labels != 0, margin), {}, ground};
+  if (depth.empty() || cv::countNonZero(hidden.where) == 0) return nearness;
+  const cv::Mat objects = objectsNearness(key.labels, depth);
+  if (!objects.empty()) {
+    hidden.limit = kBefore * objects;
+    hidden.where.setTo(0, (key.labels == 0) & (nearness > hidden.limit));  // stands before them
+  }
+  sweep(frames, hidden, margin, nearness);
   return nearness;
 }
 

@@ -10,9 +10,9 @@ namespace calipso::render {
 
 // How near the place without the objects is: CV_32FC1, 1/m along the optical axis, 0 infinitely
 // far. By the depth image where it says something of the place, else by the support planes, else
-// infinitely far. What objects hide takes that of the depths around it at which the frames that
-// look behind them agree best (plane sweep, Collins 1996), where three do; the rest continues
-// smoothly.
+// infinitely far. What objects hide is no nearer than they are. It is as near as what goes on there
+// from beside them, unless at another of the depths around it the frames that look behind them (at
+// least three) agree better (plane sweep, Collins 1996).
 // @param frames the key frame first, each with its own camera
 // @param depth CV_32FC1, m, of the key frame; 0: unknown
 // @param margin px around masks that belong to the objects
