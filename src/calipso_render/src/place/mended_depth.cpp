@@ -48,7 +48,7 @@ cv::Mat passesThrough(const cv::Mat& off, const cv::Mat& on) {
   return through;
 }
 
-// The connected pieces of a mask around most of whose rim the plane is seen: what lies between the
+// The connected pieces of a mask around a third of whose rim the plane is seen: what lies between the
 // members of a lattice that stands on it may be far behind.
 cv::Mat piecesAmong(const cv::Mat& plane, const cv::Mat& mask) {
   cv::Mat pieces, found(mask.size(), CV_8U);
@@ -66,7 +66,7 @@ cv::Mat piecesAmong(const cv::Mat& plane, const cv::Mat& mask) {
   for (int v = 0; v < mask.rows; ++v) {
     for (int u = 0; u < mask.cols; ++u) {
       const int piece = pieces.at<int>(v, u);
-      found.at<std::uint8_t>(v, u) = piece != 0 && 2 * on_plane[piece] >= rim[piece] ? 255 : 0;
+      found.at<std::uint8_t>(v, u) = piece != 0 && 3 * on_plane[piece] >= rim[piece] ? 255 : 0;
     }
   }
   return found;

@@ -9,7 +9,7 @@ namespace calipso::render {
 
 // The depth image with the gaps that measured ones have in support planes: nothing is measured on
 // what is dark, and a polished plane shows what it mirrors, farther away. Gaps that are narrow
-// against the picture, and around most of which the plane is seen, get its depth. What is seen nearer than
+// against the picture, and around a third of which the plane is seen, get its depth. What is seen nearer than
 // the planes stays.
 // @param depth CV_32FC1, m along the optical axis, 0: unknown; may be empty
 // @param labels CV_8UC1, != 0 on objects
