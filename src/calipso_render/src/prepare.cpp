@@ -104,15 +104,17 @@ void checkInput(const ClipSample& clip, const RenderParams& params) {
   }
 }
 
-void findSurfacesInClip(const ClipSample& clip, const std::vector<ClipFrame>& frames,
-                        const std::vector<ObjectModel>& models, Prepared& p) {
-  p.camera = frames.front().camera, p.key_stamp_ns = frames.front().stamp_ns;
-  p.key_picture = frames.front().bgr;
-  p.key_labels = frames.front().labels;
+void findSurfacesInClip(const ClipSample& clip, const std::vector<ObjectModel>& models,
+                        Prepared& p) {
+  const ClipFrame& key = clip.frames().front();
+  p.camera = key.camera, p.key_stamp_ns = key.stamp_ns;
+  p.key_picture = key.bgr, p.key_labels = key.labels;
+  p.camera_moves = cameraMoves(clip);
   for (const ObjectModel& m : models) {
     p.surfaces.push_back(makeSurface(m));
     p.moves.push_back(movesInVideo(clip.frames(), p.surfaces.back()));
-    p.sways.push_back(!p.moves.back() && !cameraMoves(clip) && swaysInVideo(frames, m.index));
+    p.sways.push_back(!p.moves.back() && !p.camera_moves &&
+                      swaysInVideo(clip.frames(), m.index));
   }
 }
 
@@ -249,13 +251,15 @@ Prepared prepare(const ClipSample& given_clip, const std::vector<ObjectModel>& m
   const ClipFrame& key = clip.frames().front();
   params.depth = mendedDepth(given.depth, key.labels, given.planes, key.camera);
   Prepared p;
-  p.camera_moves = cameraMoves(clip);
+  findSurfacesInClip(clip, models, p);
+  std::vector<ClipFrame> covered =
+      p.camera_moves ? withOutlines(clip.frames(), p.surfaces, p.moves) : clip.frames();
   p.nearness =
-      placeNearness(p.camera_moves ? clip.frames() : std::vector<ClipFrame>{clip.frames().front()},
+      placeNearness(p.camera_moves ? covered : std::vector<ClipFrame>{covered.front()},
                     params.planes, params.depth, params.background.mask_margin_px);
+  covered.front() = key;  // what stands before objects is seen there
   std::vector<ClipFrame> frames =
-      inKeyView(clip.frames(), p.nearness, params.background.mask_margin_px);
-  findSurfacesInClip(clip, frames, models, p);
+      inKeyView(covered, p.nearness, params.background.mask_margin_px);
   if (!p.camera_moves) coverWhatRests(p, frames);
   cv::Mat steadiness;
   const cv::Mat picture = steadyKeyFrame(frames, movingIn(frames.front().labels, p), steadiness);
@@ -289,7 +293,7 @@ Prepared prepare(const ClipSample& given_clip, const std::vector<ObjectModel>& m
                      sky_past_resting, p.camera_moves},
                     params, p);
   if (p.camera_moves && !p.background.drifting.established())
-    p.beside = platesBeside(clip.frames(), p.nearness, any_moves, params.background);
+    p.beside = platesBeside(covered, p.nearness, any_moves, params.background);
   p.background_ms += watch.lap();
   if (!p.unseen_shade.empty()) learnPastUnseen(views, light_views, params, p);
   p.appearance_ms += watch.lap();

@@ -40,6 +40,23 @@ TEST(TakePoses, AcceptsWhatFitsTheMaskAtItsStamp) {
   EXPECT_TRUE(clip.frames()[2].poses.empty());  // the ball is not where it was at the start
 }
 
+// Masks of a lattice fill its gaps and miss members: if it rests throughout, less has to fit.
+TEST(TakePoses, OfWhatRestsThroughoutMasksMayMissParts) {
+  ClipSample clip;
+  PosesByStamp at_rest, leaving;
+  for (int k = 0; k < 3; ++k) {
+    ClipFrame frame = frameWithBall(ballAt(kStart));
+    frame.stamp_ns = 1000 + k;
+    const cv::Rect box = cv::boundingRect(frame.labels);
+    if (k > 0) frame.labels(cv::Rect(box.x, box.y, box.width, box.height / 5)).setTo(0);
+    clip.add(frame);
+    at_rest[frame.stamp_ns] = {poseAt(kStart)};
+    leaving[frame.stamp_ns] = {poseAt(k < 2 ? kStart : kEnd)};
+  }
+  EXPECT_EQ(takePoses(at_rest, {ballAt(kStart)}, clip).accepted, 3);
+  EXPECT_EQ(takePoses(leaving, {ballAt(kStart)}, clip).accepted, 1);
+}
+
 TEST(TakePoses, WhatStandsBeforeTheObjectDoesNotCount) {
   ClipSample whole = rollingBall(), hidden;
   for (ClipFrame frame : whole.frames()) {

@@ -177,7 +177,7 @@ class RenderNodeWithMotionTest : public RenderNodeTest {
       calipso_msgs::Dynamics d;
       d.header = header(k);
       d.objects.resize(1);
-      d.objects[0].object = "ball", d.objects[0].tracks = 20;
+      d.objects[0].object = "ball", d.objects[0].tracks = 20, d.objects[0].moving = true;
       d.objects[0].world_from_object =
           toMsg(ballAt(kCentre + (k == kClipFrames - 1 ? 0 : k) * step_).world_from_object);
       all.frames.push_back(d);
@@ -354,6 +354,26 @@ TEST_F(RenderNodeTest, PreparesAndEditsInOrder) {
   EXPECT_EQ(changed(0), 0);
   EXPECT_GT(changed(1), 1000);  // the ball covers about 1900 px
   EXPECT_EQ(changed(2), 0);
+}
+
+TEST(Conversions, PosesAtRestAreTheKeyFrames) {
+  calipso_msgs::ClipDynamics clip;
+  clip.frames.resize(2);
+  for (int k = 0; k < 2; ++k) {
+    calipso_msgs::ObjectDynamics ball;
+    ball.object = "ball", ball.tracks = 9;
+    ball.world_from_object.position.x = 0.01 * k;
+    ball.world_from_object.orientation.w = 1.0;
+    clip.frames[k].header.stamp = ros::Time(1 + k);
+    clip.frames[k].objects.push_back(ball);
+  }
+  const std::vector<ObjectModel> models = {ballAt(kCentre)};
+  const auto poseAt = [&](int k) {
+    return posesFromMsg(clip, models).at((1 + k) * 1000000000ll).front().world_from_object;
+  };
+  EXPECT_TRUE(poseAt(1).isApprox(models.front().world_from_object));
+  clip.frames[1].objects.front().moving = true;
+  EXPECT_DOUBLE_EQ(poseAt(1).translation().x(), 0.01);
 }
 
 }  // namespace

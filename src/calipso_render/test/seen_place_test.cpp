@@ -22,7 +22,9 @@ TEST(SeenPlace, IsCarriedIntoTheCamerasView) {
   const StagedFrame frame(*s.prepared, p, in);
   ASSERT_FALSE(frame.at_key_camera);
   const SeenPlace place(frame);
-  EXPECT_TRUE(place.fronts[0].empty() && place.footprints[0].empty() && place.live == nullptr);
+  EXPECT_TRUE(place.fronts[0].empty() && place.live == nullptr);
+  const Eigen::Vector2d middle = in.camera.projectWorld(kCentre);  // the ball rests there
+  EXPECT_EQ(place.footprints[0].at<std::uint8_t>(cvRound(middle.y()), cvRound(middle.x())), 255);
   int compared = 0, beyond = 0;
   for (int v = 4; v < kHeight - 4; ++v) {
     for (int u = 4; u < kWidth - 4; ++u) {

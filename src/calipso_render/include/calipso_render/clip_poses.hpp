@@ -23,7 +23,9 @@ struct PosesTaken {
 };
 
 // Gives the clip's frames the poses that fit their pictures: the model drawn there has to overlap
-// its mask by `least` (intersection over union), where no other object's mask stands before it.
+// its mask by `least` (intersection over union), where no other object's mask stands before it. If
+// it is said to rest throughout, by part of what it does at the key frame: of a lattice masks miss
+// members and fill gaps.
 PosesTaken takePoses(const PosesByStamp& poses, const std::vector<ObjectModel>& models,
                      ClipSample& clip, double least = 0.9);
 

@@ -59,7 +59,7 @@ void FrameCompositor::drawRegion() {
       [this, carries] {
         if (carries) residual_.emplace(frame_, revealed_, surfaces_->centre(), caches_.rest);
       },
-      [this] { screen_.emplace(frame_, surfaces_->centre()); });
+      [this] { screen_.emplace(frame_, place_, surfaces_->centre()); });
   still_->leaveRelit(*light_, moved_, resting_, removed_);
   backdrop_.emplace(frame_, place_, revealed_, reflections_, others_, *surfaces_, *edges_, *light_,
                     removed_);

@@ -28,10 +28,11 @@ cv::Mat hiddenBy(const cv::Mat& scenery, const StagedFrame& frame, const Visibil
 
 }  // namespace
 
-Screen::Screen(const StagedFrame& frame, const VisibilityBuffer& seen)
+Screen::Screen(const StagedFrame& frame, const SeenPlace& place, const VisibilityBuffer& seen)
     : corner_(seen.region().tl()) {
-  const cv::Mat &scenery = frame.prepared.scenery, &matte = frame.params.matte;
-  if (!frame.at_key_camera || (scenery.empty() && matte.empty())) return;
+  const cv::Mat& scenery = place.scenery;
+  const cv::Mat matte = frame.at_key_camera ? frame.params.matte : cv::Mat();
+  if (scenery.empty() && matte.empty()) return;
   levels_ =
       matte.empty() ? cv::Mat::zeros(seen.region().size(), CV_8U) : matte(seen.region()).clone();
   if (!scenery.empty()) cv::max(levels_, hiddenBy(scenery(seen.region()), frame, seen), levels_);

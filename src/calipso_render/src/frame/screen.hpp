@@ -2,7 +2,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "frame/staged_frame.hpp"
+#include "frame/seen_place.hpp"
 
 namespace calipso::render {
 
@@ -10,7 +10,7 @@ namespace calipso::render {
 class Screen {
  public:
   // @param seen over the region that an edit can change
-  Screen(const StagedFrame& frame, const VisibilityBuffer& seen);
+  Screen(const StagedFrame& frame, const SeenPlace& place, const VisibilityBuffer& seen);
 
   // CV_8UC1 over the region: 255 = what is drawn is hidden; empty: nowhere
   const cv::Mat& levels() const { return levels_; }

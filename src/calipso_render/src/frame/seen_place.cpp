@@ -3,9 +3,11 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "calipso_render/colour.hpp"
 #include "place/key_cover.hpp"
 #include "place/place_depth.hpp"
 #include "place/plate_beside.hpp"
+#include "place/uncovered.hpp"
 #include "place/view_warp.hpp"
 
 namespace calipso::render {
@@ -41,9 +43,10 @@ void SeenPlace::driftTo(const StagedFrame& frame) {
 
 void SeenPlace::takeKeyView(const StagedFrame& frame) {
   const Prepared& prepared = frame.prepared;
-  live = prepared.background.live.empty() ? nullptr : &prepared.background.live;
+  // Frames that a moving camera takes from elsewhere have none: what is invented would jump.
+  if (!prepared.camera_moves && !prepared.background.live.empty()) live = &prepared.background.live;
   shadowless = prepared.shadowless, sunless = prepared.sunless;
-  umbra = prepared.umbra, veil = prepared.veil;
+  umbra = prepared.umbra, veil = prepared.veil, scenery = prepared.scenery;
   view = PlaceView(view.planes(), prepared.relief);
   for (std::size_t i = 0; i < fronts.size(); ++i) {
     if (prepared.fronts[i].empty() || (prepared.moves[i] && !frame.at_rest[i])) continue;
@@ -56,7 +59,8 @@ void SeenPlace::takeKeyView(const StagedFrame& frame) {
 void SeenPlace::warp(const StagedFrame& frame) {
   const Prepared& prepared = frame.prepared;
   const Camera &key = prepared.camera, &here = frame.input.camera;
-  from_key = viewWarp(nearnessFrom(prepared.nearness, key, here), key, here);
+  const cv::Mat nearness = nearnessFrom(prepared.nearness, key, here);
+  from_key = viewWarp(nearness, key, here);
   cv::Mat there = plate, invented_there = invented;
   plate = invented = cv::Mat();
   cv::remap(there, plate, from_key, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
@@ -74,6 +78,66 @@ void SeenPlace::warp(const StagedFrame& frame) {
     cv::remap(prepared.veil, veil, from_key, cv::noArray(), cv::INTER_NEAREST,
               cv::BORDER_REPLICATE);
   view = PlaceView(view.planes(), warped(prepared.relief, from_key));
+  warpScenery(frame, nearness);
+  for (std::size_t i = 0; i < prepared.moves.size(); ++i) {
+    if (frame.edited[i] && !prepared.moves[i] && prepared.surfaces[i].in_video) findCover(frame, i);
+  }
+  uncover(frame, nearness);
+}
+
+// What nearer things hide from the key frame is as this frame shows it, and where objects hide it
+// here, too, as what is beside.
+void SeenPlace::uncover(const StagedFrame& frame, const cv::Mat& nearness) {
+  const Prepared& prepared = frame.prepared;
+  const cv::Mat unknown = hiddenAtKey(nearness, frame.input.camera, from_key, prepared.nearness,
+                                      prepared.camera);
+  cv::Mat objects = frame.labels != 0;
+  for (const cv::Mat& f : footprints) {
+    if (!f.empty()) objects |= f;
+  }
+  objects = grown(objects, frame.params.background.mask_margin_px);
+  for (int v = 0; v < plate.rows; ++v) {
+    for (int u = 0; u < plate.cols; ++u) {
+      if (unknown.at<std::uint8_t>(v, u) == 0 || objects.at<std::uint8_t>(v, u) != 0) continue;
+      for (int c = 0; c < 3; ++c)
+        plate.at<cv::Vec3f>(v, u)[c] = linearFromCode(frame.input.bgr.at<cv::Vec3b>(v, u)[c]);
+    }
+  }
+  invented.setTo(0, unknown), invented.setTo(255, unknown & objects);
+  continueInto(unknown & objects, nearness, plate);
+}
+
+// @param nearness of the place, this view
+void SeenPlace::warpScenery(const StagedFrame& frame, const cv::Mat& nearness) {
+  if (frame.prepared.scenery.empty()) return;
+  cv::Mat known;
+  cv::remap(frame.prepared.scenery > 0.0f, known, from_key, cv::noArray(), cv::INTER_NEAREST,
+            cv::BORDER_CONSTANT, cv::Scalar(0));
+  scenery = cv::Mat::zeros(nearness.size(), CV_32F);
+  nearness.copyTo(scenery, known);
+}
+
+// What the video shows of an object at rest, also where its mask misses it (thin parts), and what of
+// the scenery stands before it.
+void SeenPlace::findCover(const StagedFrame& frame, std::size_t surface) {
+  const Surface& s = frame.prepared.surfaces[surface];
+  const Actor actor = makeActor(s, s.key_vertices, frame.input.camera);
+  const VisibilityBuffer seen(frame.whole(), {&actor.screen});
+  cv::Mat own = cv::Mat::zeros(frame.labels.size(), CV_32F), front;
+  for (int v = 0; v < own.rows; ++v) {
+    for (int u = 0; u < own.cols; ++u) {
+      if (seen.ids(v)[u] != VisibilityBuffer::kNothing) own.at<float>(v, u) = seen.nearness(v)[u];
+    }
+  }
+  footprints[surface] = own > 0.0f;
+  if (scenery.empty()) return;
+  front = (own > 0.0f) & (frame.labels == 0) & (scenery > kBehind * own);
+  if (cv::countNonZero(front) == 0) return;
+  footprints[surface] &= ~front;
+  // The object's margin does not reach into it.
+  const int margin = frame.params.background.mask_margin_px + 1;
+  front |= grown(front, margin) & (frame.labels == 0) & (scenery > kBehind * grown(own, margin));
+  fronts[surface] = front;
 }
 
 // Takes what lies beside the key frame's picture from the plates of other cameras.

@@ -26,10 +26,11 @@ struct SeenPlace {
   cv::Mat sunless;     // Prepared::sunless
   cv::Mat umbra;       // Prepared::umbra
   cv::Mat veil;        // Prepared::veil
-  // From the key frame's camera alone; elsewhere empty
-  std::vector<cv::Mat> fronts;      // Prepared::fronts
-  std::vector<cv::Mat> footprints;  // Prepared::footprints
-  const LiveFill* live = nullptr;   // Background::live
+  cv::Mat scenery;     // Prepared::scenery
+  // Prepared::fronts and ::footprints; from other cameras than the key frame's those of edited
+  // objects at rest, by their models alone
+  std::vector<cv::Mat> fronts, footprints;
+  const LiveFill* live = nullptr;  // Background::live; from the key frame's camera alone
 
   bool takesShadow(int u, int v) const {
     return view.sees(u, v) && (shadowless.empty() || shadowless.at<std::uint8_t>(v, u) == 0);
@@ -44,7 +45,10 @@ struct SeenPlace {
   void driftTo(const StagedFrame& frame);
   void takeKeyView(const StagedFrame& frame);
   void warp(const StagedFrame& frame);
+  void warpScenery(const StagedFrame& frame, const cv::Mat& nearness);
+  void findCover(const StagedFrame& frame, std::size_t surface);
   void lookBeside(const StagedFrame& frame);
+  void uncover(const StagedFrame& frame, const cv::Mat& nearness);
 };
 
 }  // namespace calipso::render

@@ -12,6 +12,7 @@ namespace calipso::render {
 namespace {
 
 constexpr double kStillOverlap = 0.93;  // masks of an object at rest overlap by more than this
+constexpr float kSamePlace = 1e-3f;     // of the distance: half a pixel or so
 constexpr int kSameCodes = 8;           // code values, mean over 3 x 3 pixels, that noise may make
 // part of an object in which the picture changes by more if it sways
 constexpr double kSwayed = 0.15;
@@ -34,6 +35,21 @@ bool cameraMoves(const ClipSample& clip) {
                      [&](const ClipFrame& f) { return !sameView(f.camera, key); });
 }
 
+std::vector<ClipFrame> withOutlines(std::vector<ClipFrame> frames,
+                                    const std::vector<Surface>& surfaces,
+                                    const std::vector<bool>& moves) {
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    cv::Mat labels = frames[k].labels.clone();
+    for (std::size_t i = 0; i < surfaces.size(); ++i) {
+      if (!moves[i])
+        labels.setTo(surfaces[i].index, outlineAtRest(surfaces[i], frames[k].camera) & (labels == 0));
+    }
+    frames[k].labels = labels;
+  }
+  return frames;
+}
+
 std::vector<ClipFrame> inKeyView(std::vector<ClipFrame> frames, const cv::Mat& nearness,
                                  int margin) {
   const Camera key = frames.front().camera;
@@ -51,7 +67,28 @@ std::vector<ClipFrame> inKeyView(std::vector<ClipFrame> frames, const cv::Mat& n
   return frames;
 }
 
-bool movesInVideo(const std::vector<ClipFrame>& frames, const Surface& surface) {
+namespace {
+
+// Whether every frame of a moving camera has a pose of the object, and all are the key frame's.
+bool restsByPoses(const std::vector<ClipFrame>& frames, const Surface& surface) {
+  const Eigen::Vector3f eye = frames.front().camera.world_from_camera.translation().cast<float>();
+  bool camera_moves = false;
+  for (const ClipFrame& f : frames) {
+    camera_moves |= !sameView(f.camera, frames.front().camera);
+    const auto pose = std::find_if(f.poses.begin(), f.poses.end(), [&](const ObjectPose& p) {
+      return p.index == surface.index;
+    });
+    if (pose == f.poses.end()) return false;
+    const Points now = transformed(surface.object_vertices, pose->world_from_object);
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      if ((now[i] - surface.key_vertices[i]).norm() > kSamePlace * (now[i] - eye).norm())
+        return false;
+    }
+  }
+  return camera_moves;
+}
+
+bool movesByMasks(const std::vector<ClipFrame>& frames, const Surface& surface) {
   const Camera& camera = frames.front().camera;
   const cv::Mat key = frames.front().labels == surface.index;
   std::optional<double> fit;
@@ -65,6 +102,12 @@ bool movesInVideo(const std::vector<ClipFrame>& frames, const Surface& surface) 
     if (!rests) return true;
   }
   return false;
+}
+
+}  // namespace
+
+bool movesInVideo(const std::vector<ClipFrame>& frames, const Surface& surface) {
+  return movesByMasks(frames, surface) && !restsByPoses(frames, surface);
 }
 
 bool swaysInVideo(const std::vector<ClipFrame>& frames, int index) {

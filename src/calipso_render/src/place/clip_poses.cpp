@@ -7,6 +7,8 @@
 namespace calipso::render {
 namespace {
 
+constexpr double kOfKeyOverlap = 0.7;  // by which what rests has to overlap its mask
+
 // Of the model drawn at a pose with the object's mask; what another object's mask covers does not
 // count.
 double overlap(const ObjectModel& model, const ObjectPose& pose, const ClipFrame& frame) {
@@ -32,11 +34,28 @@ double overlap(const ObjectModel& model, const ObjectPose& pose, const ClipFrame
   return either > 0 ? static_cast<double>(both) / static_cast<double>(either) : 1.0;
 }
 
+// Whether every frame says that the object is where the key frame has it.
+bool restsThroughout(const PosesByStamp& poses, const ObjectModel& model) {
+  return std::all_of(poses.begin(), poses.end(), [&](const auto& frame) {
+    return std::any_of(frame.second.begin(), frame.second.end(), [&](const ObjectPose& pose) {
+      return pose.index == model.index &&
+             pose.world_from_object.isApprox(model.world_from_object, 1e-6);
+    });
+  });
+}
+
 }  // namespace
 
 PosesTaken takePoses(const PosesByStamp& poses, const std::vector<ObjectModel>& models,
                      ClipSample& clip, double least) {
   PosesTaken taken;
+  std::map<int, double> needed;
+  for (const ObjectModel& m : models) {
+    needed[m.index] = least;
+    if (!restsThroughout(poses, m)) continue;
+    const double at_key = overlap(m, {m.index, m.world_from_object}, clip.frames().front());
+    needed[m.index] = std::min(least, kOfKeyOverlap * at_key);
+  }
   for (std::size_t i = 0; i < clip.frames().size(); ++i) {
     const ClipFrame& frame = clip.frames()[i];
     const auto here = poses.find(frame.stamp_ns);
@@ -48,7 +67,7 @@ PosesTaken takePoses(const PosesByStamp& poses, const std::vector<ObjectModel>& 
       if (model == models.end()) continue;
       ++taken.offered;
       const double fit = overlap(*model, pose, frame);
-      if (fit < least) continue;
+      if (fit < needed[pose.index]) continue;
       ++taken.accepted;
       taken.worst_accepted_overlap = std::min(taken.worst_accepted_overlap, fit);
       fitting.push_back(pose);

@@ -23,6 +23,28 @@ constexpr float kOffPlane = 0.02f;     // part by which what is on a plane is ne
 constexpr float kBefore = 1.1f;        // times that what hides a place is nearer than it,
 constexpr float kLeastBefore = 1e-4f;  // 1/m
 
+}  // namespace
+
+bool isBefore(float thing, float place) { return thing > kBefore * place + kLeastBefore; }
+
+cv::Mat ofNearest(const cv::Mat& values, const cv::Mat& where) {
+  cv::Mat away, nearest, out(values.size(), CV_32F);
+  cv::distanceTransform(where == 0, away, nearest, cv::DIST_L2, 5, cv::DIST_LABEL_PIXEL);
+  std::vector<float> by_label(where.total() + 1, 0.0f);
+  for (int v = 0; v < where.rows; ++v) {
+    for (int u = 0; u < where.cols; ++u) {
+      if (where.at<std::uint8_t>(v, u) != 0)
+        by_label[nearest.at<int>(v, u)] = values.at<float>(v, u);
+    }
+  }
+  for (int v = 0; v < out.rows; ++v) {
+    for (int u = 0; u < out.cols; ++u) out.at<float>(v, u) = by_label[nearest.at<int>(v, u)];
+  }
+  return out;
+}
+
+namespace {
+
 cv::Mat grown(const cv::Mat& mask, int radius) {
   cv::Mat out;
   cv::dilate(mask, out,
@@ -121,24 +143,6 @@ cv::Mat spreadOf(const std::vector<Sight>& sights, const Camera& key, const cv::
   spread /= total;
   spread.setTo(kNoSpread, unseen);
   return spread;
-}
-
-// The values of the nearest pixels of `where`, which has some; those of `where` have their own.
-// @param values CV_32FC1
-cv::Mat ofNearest(const cv::Mat& values, const cv::Mat& where) {
-  cv::Mat away, nearest, out(values.size(), CV_32F);
-  cv::distanceTransform(where == 0, away, nearest, cv::DIST_L2, 5, cv::DIST_LABEL_PIXEL);
-  std::vector<float> by_label(where.total() + 1, 0.0f);
-  for (int v = 0; v < where.rows; ++v) {
-    for (int u = 0; u < where.cols; ++u) {
-      if (where.at<std::uint8_t>(v, u) != 0)
-        by_label[nearest.at<int>(v, u)] = values.at<float>(v, u);
-    }
-  }
-  for (int v = 0; v < out.rows; ++v) {
-    for (int u = 0; u < out.cols; ++u) out.at<float>(v, u) = by_label[nearest.at<int>(v, u)];
-  }
-  return out;
 }
 
 // Where a surface goes on behind the objects: frames that show it agree about as well as at any
@@ -352,8 +356,7 @@ cv::Mat hiddenFrom(const cv::Mat& nearness, const cv::Mat& guessed, const Camera
       if (!place) continue;
       const int x = cvRound(place->x()), y = cvRound(place->y());
       if (x < 0 || y < 0 || x >= to.width || y >= to.height) continue;
-      if (nearest.at<float>(y, x) > kBefore * near / place->z() + kLeastBefore)
-        hidden.at<std::uint8_t>(v, u) = 255;
+      if (isBefore(nearest.at<float>(y, x), near / place->z())) hidden.at<std::uint8_t>(v, u) = 255;
     }
   }
   return hidden;

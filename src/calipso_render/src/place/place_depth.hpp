@@ -19,6 +19,13 @@ namespace calipso::render {
 cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<SupportPlane>& planes,
                       const cv::Mat& depth, int margin);
 
+// Whether something hides a place. @param thing, place 1/m
+bool isBefore(float thing, float place);
+
+// The values of the nearest pixels of `where`, which has some; those of `where` have their own.
+// @param values CV_32FC1
+cv::Mat ofNearest(const cv::Mat& values, const cv::Mat& where);
+
 // The same from another camera's view; what the key frame does not show is as near as the farthest
 // beside it.
 cv::Mat nearnessFrom(const cv::Mat& nearness, const Camera& key, const Camera& to);

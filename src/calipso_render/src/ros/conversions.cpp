@@ -89,6 +89,15 @@ Look fromMsg(const calipso_msgs::Look& msg) {
   return look;
 }
 
+// Whether a frame says of an object that it moves, beyond what its pose is uncertain by.
+bool movesInAny(const calipso_msgs::ClipDynamics& dynamics, const std::string& object) {
+  return std::any_of(dynamics.frames.begin(), dynamics.frames.end(), [&](const auto& frame) {
+    return std::any_of(frame.objects.begin(), frame.objects.end(), [&](const auto& o) {
+      return o.object == object && o.moving;
+    });
+  });
+}
+
 }  // namespace
 
 PosesByStamp posesFromMsg(const calipso_msgs::ClipDynamics& dynamics,
@@ -101,7 +110,9 @@ PosesByStamp posesFromMsg(const calipso_msgs::ClipDynamics& dynamics,
                                       [&](const ObjectModel& m) { return m.name == o.object; });
       const bool rigid = o.tracks > 0 && o.mode_amplitudes.empty();
       if (rigid && model != models.end())
-        here.push_back({model->index, calipso::fromMsg(o.world_from_object)});
+        here.push_back({model->index, movesInAny(dynamics, o.object)
+                                          ? calipso::fromMsg(o.world_from_object)
+                                          : model->world_from_object});
     }
   }
   return poses;

@@ -33,7 +33,8 @@ sensor_msgs::Image imageMsg(const std_msgs::Header& header, const cv::Mat& image
 
 std::vector<ObjectModel> fromMsg(const calipso_msgs::AlignedModels& models);
 
-// Of the objects that were followed as rigid bodies.
+// Of the objects that were followed as rigid bodies: the key frame's if none says that it moves, as
+// poses at rest err.
 PosesByStamp posesFromMsg(const calipso_msgs::ClipDynamics& dynamics,
                           const std::vector<ObjectModel>& models);
 
