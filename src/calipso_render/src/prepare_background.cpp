@@ -330,6 +330,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   const PlaceSurfaces surfaces =
       findSurfaces(p.scenery, params.depth, p.key_labels, params.planes, p.camera);
   const SeenPlace place = findPlace(surfaces, params, p);
+  p.shadowless |= frontsInSun(e.sun, params, p);
   const ReceiverOf in_sun = receiversOf(params.planes, p.relief, place.blind, p.camera),
                    under_sky = receiversOf(params.planes, p.relief, place.off_planes, p.camera);
   cv::Mat sun = placeVisibility(e.sun, in_sun, key.bgr.size());

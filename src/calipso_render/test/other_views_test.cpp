@@ -7,6 +7,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/renderer.hpp"
+#include "calipso_render/shadow_map.hpp"
+#include "place/key_cover.hpp"
 #include "place/uncovered.hpp"
 #include "place/view_warp.hpp"
 
@@ -127,6 +129,52 @@ TEST(OtherViews, WhatStandsBeforeAnEditedObjectHidesIt) {
       ASSERT_NEAR(out.at<cv::Vec3b>(v, u)[0], kCrateColour, 3) << u << ", " << v;
   }
   EXPECT_GT(out.at<cv::Vec3b>(moved.y + 10, moved.x + 6)[0], 200);  // above it, it is seen
+}
+
+// A flower on its stem, two pixels wide, before an object that is taken away, stays.
+TEST(Fronts, ThinPartsOfWhatStandsBeforeAnObjectStay) {
+  ClipFrame frame = frameFrom(0.0);
+  RenderParams render = params();
+  render.depth(kCrateBox).setTo(kWall);
+  const cv::Rect board(40, 10, 100, 80), head(60, 20, 11, 11), stem(64, 31, 2, 30);
+  frame.labels.setTo(0), frame.labels(board).setTo(1), frame.bgr(board).setTo(cv::Scalar::all(250));
+  render.depth(board).setTo(kPost);
+  cv::Mat flower = cv::Mat::zeros(kHigh, kWide, CV_8U);
+  for (const cv::Rect& part : {head, stem}) flower(part).setTo(255);
+  frame.labels.setTo(0, flower), frame.bgr.setTo(cv::Scalar::all(20), flower);
+  render.depth.setTo(kCrate, flower);
+  ClipSample clip;
+  clip.add(frame);
+  ObjectModel model = post();
+  const Camera c = cameraAt(0.0);
+  const int right = board.br().x - 1, bottom = board.br().y - 1;
+  model.mesh.vertices << c.ray(board.x, board.y).transpose(), c.ray(right, board.y).transpose(),
+      c.ray(right, bottom).transpose(), c.ray(board.x, bottom).transpose();
+  model.mesh.vertices *= kPost;
+  const auto p = std::make_shared<const Prepared>(prepare(clip, {model}, render));
+  const cv::Mat out = Renderer(p, render).composite(input(frame, 0.0f, true)).bgr;
+  EXPECT_EQ(cv::norm(out, frame.bgr, cv::NORM_INF, flower), 0.0);
+  EXPECT_LT(out.at<cv::Vec3b>(50, 110)[0], 200);  // the board is gone
+}
+
+TEST(Fronts, InTheSunAreNotAsThePlaneBehindThem) {
+  const ShadowMap all_sun({}, Eigen::Vector3d(0.0, 0.0, -1.0), {64, 0.0, 16});
+  RenderParams render = params();
+  Prepared p;
+  p.camera = cameraAt(0.0);
+  p.light.light.direction = Eigen::Vector3f(0.0f, 0.0f, -1.0f);
+  p.key_labels = cv::Mat::zeros(kHigh, kWide, CV_8U);
+  p.scenery = cv::Mat::zeros(kHigh, kWide, CV_32F);
+  SupportPlane wall;
+  wall.normal = Eigen::Vector3d(0.0, 0.0, -1.0), wall.offset = -kWall;
+  render.planes = {wall};
+  cv::Mat front = cv::Mat::zeros(kHigh, kWide, CV_8U);
+  front(cv::Rect(kCrateBox.x - 20, kCrateBox.y, 40, 20)).setTo(255);
+  p.fronts = {front};
+  const cv::Mat lit = frontsInSun(all_sun, render, p);
+  EXPECT_EQ(lit.at<std::uint8_t>(kCrateBox.y + 5, kCrateBox.x + 5), 255);   // on the crate
+  EXPECT_EQ(lit.at<std::uint8_t>(kCrateBox.y + 5, kCrateBox.x - 15), 0);    // on the wall
+  EXPECT_EQ(lit.at<std::uint8_t>(kCrateBox.y + 30, kCrateBox.x + 5), 0);    // no front
 }
 
 TEST(Uncovered, IsWhatANearerThingHidesFromTheKeyFrame) {

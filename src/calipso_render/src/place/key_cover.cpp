@@ -14,6 +14,10 @@ constexpr int kNarrowFront = 3;     // ... so much of them
 constexpr float kDeepFront = 6.0f;  // ... that far inside the model's outline: a peg on a towel
 constexpr int kRim = 2;             // px beyond a model's outline in which its rim may be drawn
 constexpr int kBroad = 7;           // px: what is narrower is a blade
+constexpr float kInSun = 0.5f;      // part of it from which something is not shaded
+// part by which what stands before a plane is nearer if it has another light: blades of grass have
+// that of their ground
+constexpr float kFarBefore = 0.25f;
 constexpr int kAmong = 10;          // px around a place in which blades are counted
 constexpr float kDense = 0.04f;     // part of these pixels from which it is among blades
 // part by which scenery is nearer or farther than the plane behind or before it
@@ -41,6 +45,11 @@ cv::Mat nearnessOf(const cv::Mat& depth) {
 // Where the depth image shows the support planes. @param ground nearness of these
 cv::Mat onGround(const cv::Mat& nearness, const cv::Mat& ground) {
   return (ground > 0.0f) & (cv::abs(nearness - ground) <= (kBehind - 1.0f) * nearness);
+}
+
+// Where it shows something well before the planes, in another light than theirs.
+cv::Mat farBefore(const cv::Mat& nearness, const cv::Mat& ground) {
+  return ground.empty() ? cv::Mat(nearness > 0.0f) : cv::Mat(nearness > (1.0f + kFarBefore) * ground);
 }
 
 // What the depth image shows just beside an object, off the planes and nearer.
@@ -96,8 +105,11 @@ std::vector<cv::Mat> frontsOf(const Prepared& p, const RenderParams& params) {
       front.setTo(0, grown(mask, kWaterline) & grown(onGround(nearness, ground), 1));
     if (!nearness.empty() && !p.moves[i]) {
       // Blades of grass are narrower: beside them pixels are mixed with the object, and go with it.
-      const cv::Mat beside = opened(
-          nearerBeside(mask, p.key_labels, nearness, ground, params.background), kNarrowFront);
+      const cv::Mat nearer =
+                        nearerBeside(mask, p.key_labels, nearness, ground, params.background),
+                    things = nearer & farBefore(nearness, ground),
+                    beside = opened(nearer, kNarrowFront) |
+                             touchingPieces(things, opened(things, kBroad));  // a flower's stem
       if (cv::countNonZero(beside) > 0) front = front.empty() ? beside : cv::Mat(front | beside);
     }
     // The outline of what is hidden is hidden, too, with the pixels that it only touches.
@@ -141,6 +153,27 @@ cv::Mat bladesBefore(const Prepared& p, const RenderParams& params) {
   }
   cv::boxFilter(blades, part, CV_32F, {2 * kAmong + 1, 2 * kAmong + 1});
   return (part > 255.0f * kDense) & ~outlines;
+}
+
+cv::Mat frontsInSun(const Visibility& sun, const RenderParams& params, const Prepared& p) {
+  cv::Mat lit = cv::Mat::zeros(p.key_labels.size(), CV_8U);
+  if (params.depth.empty()) return lit;
+  const cv::Mat before = farBefore(nearnessOf(params.depth),
+                                   groundNearness(params.planes, p.camera, cv::Mat()));
+  const Eigen::Isometry3f camera = p.camera.world_from_camera.cast<float>();
+  for (const cv::Mat& front : p.fronts) {
+    if (front.empty()) continue;
+    const cv::Mat unknown = front & before & (p.scenery == 0.0f);
+    for (int v = 0; v < front.rows; ++v) {
+      for (int u = 0; u < front.cols; ++u) {
+        if (unknown.at<std::uint8_t>(v, u) == 0) continue;
+        const Eigen::Vector3f at =
+            camera * (params.depth.at<float>(v, u) * p.camera.ray(u, v).cast<float>());
+        if (sun.visibility(at, p.light.light.direction) > kInSun) lit.at<std::uint8_t>(v, u) = 255;
+      }
+    }
+  }
+  return lit;
 }
 
 std::vector<cv::Mat> footprintsOf(const Prepared& p, const cv::Mat& picture, int margin) {

@@ -40,6 +40,10 @@ cv::Mat bladesBefore(const Prepared& p, const RenderParams& params);
 // @param picture CV_32FC3, code values: the key frame; margin px around footprints that go with them
 std::vector<cv::Mat> footprintsOf(const Prepared& p, const cv::Mat& picture, int margin);
 
+// CV_8UC1: of Prepared::fronts what is not known to be scenery, stands well before the planes, and
+// lies in the sun past the objects: the plane behind it may be in their shadow, it is not.
+cv::Mat frontsInSun(const Visibility& sun, const RenderParams& params, const Prepared& p);
+
 // CV_8UC1: 255 where the depth image shows something nearer than the object beside it in the picture:
 // it stands before that and does not go on behind it.
 // @param scenery sceneryOf() @param depth CV_32FC1, m, 0: unknown
