@@ -113,8 +113,7 @@ void findSurfacesInClip(const ClipSample& clip, const std::vector<ObjectModel>& 
   for (const ObjectModel& m : models) {
     p.surfaces.push_back(makeSurface(m));
     p.moves.push_back(movesInVideo(clip.frames(), p.surfaces.back()));
-    p.sways.push_back(!p.moves.back() && !p.camera_moves &&
-                      swaysInVideo(clip.frames(), m.index));
+    p.sways.push_back(!p.moves.back() && !p.camera_moves && swaysInVideo(clip.frames(), m.index));
   }
 }
 
@@ -254,12 +253,10 @@ Prepared prepare(const ClipSample& given_clip, const std::vector<ObjectModel>& m
   findSurfacesInClip(clip, models, p);
   std::vector<ClipFrame> covered =
       p.camera_moves ? withOutlines(clip.frames(), p.surfaces, p.moves) : clip.frames();
-  p.nearness =
-      placeNearness(p.camera_moves ? covered : std::vector<ClipFrame>{covered.front()},
-                    params.planes, params.depth, params.background.mask_margin_px);
+  p.nearness = placeNearness(p.camera_moves ? covered : std::vector<ClipFrame>{covered.front()},
+                             params.planes, params.depth, params.background.mask_margin_px);
   covered.front() = key;  // what stands before objects is seen there
-  std::vector<ClipFrame> frames =
-      inKeyView(covered, p.nearness, params.background.mask_margin_px);
+  std::vector<ClipFrame> frames = inKeyView(covered, p.nearness, params.background.mask_margin_px);
   if (!p.camera_moves) coverWhatRests(p, frames);
   cv::Mat steadiness;
   const cv::Mat picture = steadyKeyFrame(frames, movingIn(frames.front().labels, p), steadiness);

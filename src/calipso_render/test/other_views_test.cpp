@@ -30,7 +30,8 @@ Camera cameraAt(double right) {
 
 std::uint8_t wallColour(const Camera& camera, int u, int v) {
   const Eigen::Vector3d p = kWall * camera.ray(u, v) + camera.world_from_camera.translation();
-  return cv::saturate_cast<std::uint8_t>(140.0 + 30.0 * std::sin(9.0 * p.x()) * std::cos(7.0 * p.y()));
+  return cv::saturate_cast<std::uint8_t>(140.0 +
+                                         30.0 * std::sin(9.0 * p.x()) * std::cos(7.0 * p.y()));
 }
 
 cv::Rect seenFrom(double right, const cv::Rect& at_key, float away) {
@@ -44,7 +45,8 @@ ClipFrame frameFrom(double right, int masked = kPostBox.height) {
     for (int u = 0; u < kWide; ++u)
       f.bgr.at<cv::Vec3b>(v, u) = cv::Vec3b::all(wallColour(f.camera, u, v));
   }
-  const cv::Rect post = seenFrom(right, kPostBox, kPost), crate = seenFrom(right, kCrateBox, kCrate);
+  const cv::Rect post = seenFrom(right, kPostBox, kPost),
+                 crate = seenFrom(right, kCrateBox, kCrate);
   f.bgr(post).setTo(cv::Scalar::all(kPostColour));
   f.labels(cv::Rect(post.x, post.y, post.width, masked)).setTo(1);
   f.bgr(crate).setTo(cv::Scalar::all(kCrateColour)), f.labels(crate).setTo(0);
@@ -108,8 +110,7 @@ TEST(OtherViews, WhatMasksMissOfAnObjectAtRestGoesWithIt) {
   const cv::Rect box = seenFrom(right, kPostBox, kPost), crate = seenFrom(right, kCrateBox, kCrate);
   for (int v = box.y; v < box.br().y; ++v) {
     for (int u = box.x; u < box.br().x; ++u) {
-      const int expected =
-          crate.contains({u, v}) ? kCrateColour : wallColour(frame.camera, u, v);
+      const int expected = crate.contains({u, v}) ? kCrateColour : wallColour(frame.camera, u, v);
       ASSERT_NEAR(out.at<cv::Vec3b>(v, u)[0], expected, 16) << u << ", " << v;
     }
   }
@@ -172,9 +173,9 @@ TEST(Fronts, InTheSunAreNotAsThePlaneBehindThem) {
   front(cv::Rect(kCrateBox.x - 20, kCrateBox.y, 40, 20)).setTo(255);
   p.fronts = {front};
   const cv::Mat lit = frontsInSun(all_sun, render, p);
-  EXPECT_EQ(lit.at<std::uint8_t>(kCrateBox.y + 5, kCrateBox.x + 5), 255);   // on the crate
-  EXPECT_EQ(lit.at<std::uint8_t>(kCrateBox.y + 5, kCrateBox.x - 15), 0);    // on the wall
-  EXPECT_EQ(lit.at<std::uint8_t>(kCrateBox.y + 30, kCrateBox.x + 5), 0);    // no front
+  EXPECT_EQ(lit.at<std::uint8_t>(kCrateBox.y + 5, kCrateBox.x + 5), 255);  // on the crate
+  EXPECT_EQ(lit.at<std::uint8_t>(kCrateBox.y + 5, kCrateBox.x - 15), 0);   // on the wall
+  EXPECT_EQ(lit.at<std::uint8_t>(kCrateBox.y + 30, kCrateBox.x + 5), 0);   // no front
 }
 
 TEST(Uncovered, IsWhatANearerThingHidesFromTheKeyFrame) {
@@ -198,14 +199,15 @@ TEST(Uncovered, IsWhatANearerThingHidesFromTheKeyFrame) {
 
 TEST(Uncovered, GoesOnFromWhatIsNoNearer) {
   cv::Mat nearness(kHigh, kWide, CV_32F, cv::Scalar(1.0f / kWall)),
-      plate(kHigh, kWide, CV_32FC3, cv::Scalar::all(0.5)), holes = cv::Mat::zeros(kHigh, kWide, CV_8U);
+      plate(kHigh, kWide, CV_32FC3, cv::Scalar::all(0.5)),
+      holes = cv::Mat::zeros(kHigh, kWide, CV_8U);
   nearness(kCrateBox).setTo(1.0f / kCrate), plate(kCrateBox).setTo(cv::Scalar::all(0.02));
   const cv::Rect beside(kCrateBox.br().x, kCrateBox.y, 8, kCrateBox.height);
   holes(beside).setTo(255), plate(beside).setTo(cv::Scalar::all(0.02));
   continueInto(holes, nearness, plate);
-  EXPECT_LT(cv::norm(plate(beside), cv::Mat(beside.size(), CV_32FC3, cv::Scalar::all(0.5)),
-                     cv::NORM_INF),
-            1e-3);
+  EXPECT_LT(
+      cv::norm(plate(beside), cv::Mat(beside.size(), CV_32FC3, cv::Scalar::all(0.5)), cv::NORM_INF),
+      1e-3);
 }
 
 }  // namespace

@@ -89,8 +89,8 @@ void SeenPlace::warp(const StagedFrame& frame) {
 // here, too, as what is beside.
 void SeenPlace::uncover(const StagedFrame& frame, const cv::Mat& nearness) {
   const Prepared& prepared = frame.prepared;
-  const cv::Mat unknown = hiddenAtKey(nearness, frame.input.camera, from_key, prepared.nearness,
-                                      prepared.camera);
+  const cv::Mat unknown =
+      hiddenAtKey(nearness, frame.input.camera, from_key, prepared.nearness, prepared.camera);
   cv::Mat objects = frame.labels != 0;
   for (const cv::Mat& f : footprints) {
     if (!f.empty()) objects |= f;

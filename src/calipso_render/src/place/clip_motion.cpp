@@ -43,7 +43,8 @@ std::vector<ClipFrame> withOutlines(std::vector<ClipFrame> frames,
     cv::Mat labels = frames[k].labels.clone();
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
       if (!moves[i])
-        labels.setTo(surfaces[i].index, outlineAtRest(surfaces[i], frames[k].camera) & (labels == 0));
+        labels.setTo(surfaces[i].index,
+                     outlineAtRest(surfaces[i], frames[k].camera) & (labels == 0));
     }
     frames[k].labels = labels;
   }
@@ -75,9 +76,8 @@ bool restsByPoses(const std::vector<ClipFrame>& frames, const Surface& surface) 
   bool camera_moves = false;
   for (const ClipFrame& f : frames) {
     camera_moves |= !sameView(f.camera, frames.front().camera);
-    const auto pose = std::find_if(f.poses.begin(), f.poses.end(), [&](const ObjectPose& p) {
-      return p.index == surface.index;
-    });
+    const auto pose = std::find_if(f.poses.begin(), f.poses.end(),
+                                   [&](const ObjectPose& p) { return p.index == surface.index; });
     if (pose == f.poses.end()) return false;
     const Points now = transformed(surface.object_vertices, pose->world_from_object);
     for (std::size_t i = 0; i < now.size(); ++i) {

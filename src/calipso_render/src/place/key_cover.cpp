@@ -18,8 +18,8 @@ constexpr float kInSun = 0.5f;      // part of it from which something is not sh
 // part by which what stands before a plane is nearer if it has another light: blades of grass have
 // that of their ground
 constexpr float kFarBefore = 0.25f;
-constexpr int kAmong = 10;          // px around a place in which blades are counted
-constexpr float kDense = 0.04f;     // part of these pixels from which it is among blades
+constexpr int kAmong = 10;       // px around a place in which blades are counted
+constexpr float kDense = 0.04f;  // part of these pixels from which it is among blades
 // part by which scenery is nearer or farther than the plane behind or before it
 constexpr float kOffPlane = 0.1f;
 constexpr int kWaterline = 2;  // px by which masks end before it, and over which it mixes
@@ -49,7 +49,8 @@ cv::Mat onGround(const cv::Mat& nearness, const cv::Mat& ground) {
 
 // Where it shows something well before the planes, in another light than theirs.
 cv::Mat farBefore(const cv::Mat& nearness, const cv::Mat& ground) {
-  return ground.empty() ? cv::Mat(nearness > 0.0f) : cv::Mat(nearness > (1.0f + kFarBefore) * ground);
+  return ground.empty() ? cv::Mat(nearness > 0.0f)
+                        : cv::Mat(nearness > (1.0f + kFarBefore) * ground);
 }
 
 // What the depth image shows just beside an object, off the planes and nearer.
@@ -105,8 +106,7 @@ std::vector<cv::Mat> frontsOf(const Prepared& p, const RenderParams& params) {
       front.setTo(0, grown(mask, kWaterline) & grown(onGround(nearness, ground), 1));
     if (!nearness.empty() && !p.moves[i]) {
       // Blades of grass are narrower: beside them pixels are mixed with the object, and go with it.
-      const cv::Mat nearer =
-                        nearerBeside(mask, p.key_labels, nearness, ground, params.background),
+      const cv::Mat nearer = nearerBeside(mask, p.key_labels, nearness, ground, params.background),
                     things = nearer & farBefore(nearness, ground),
                     beside = opened(nearer, kNarrowFront) |
                              touchingPieces(things, opened(things, kBroad));  // a flower's stem
@@ -158,8 +158,8 @@ cv::Mat bladesBefore(const Prepared& p, const RenderParams& params) {
 cv::Mat frontsInSun(const Visibility& sun, const RenderParams& params, const Prepared& p) {
   cv::Mat lit = cv::Mat::zeros(p.key_labels.size(), CV_8U);
   if (params.depth.empty()) return lit;
-  const cv::Mat before = farBefore(nearnessOf(params.depth),
-                                   groundNearness(params.planes, p.camera, cv::Mat()));
+  const cv::Mat before =
+      farBefore(nearnessOf(params.depth), groundNearness(params.planes, p.camera, cv::Mat()));
   const Eigen::Isometry3f camera = p.camera.world_from_camera.cast<float>();
   for (const cv::Mat& front : p.fronts) {
     if (front.empty()) continue;

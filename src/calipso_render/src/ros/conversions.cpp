@@ -92,9 +92,8 @@ Look fromMsg(const calipso_msgs::Look& msg) {
 // Whether a frame says of an object that it moves, beyond what its pose is uncertain by.
 bool movesInAny(const calipso_msgs::ClipDynamics& dynamics, const std::string& object) {
   return std::any_of(dynamics.frames.begin(), dynamics.frames.end(), [&](const auto& frame) {
-    return std::any_of(frame.objects.begin(), frame.objects.end(), [&](const auto& o) {
-      return o.object == object && o.moving;
-    });
+    return std::any_of(frame.objects.begin(), frame.objects.end(),
+                       [&](const auto& o) { return o.object == object && o.moving; });
   });
 }
 
