@@ -8,6 +8,7 @@
 #include "calipso_render/shadow_map.hpp"
 #include "calipso_render/sky_map.hpp"
 #include "frame/edge_blur.hpp"
+#include "light/light_pictures.hpp"
 #include "light/shadow_borders.hpp"
 #include "model_details.hpp"
 #include "place/blank_frames.hpp"
@@ -142,12 +143,18 @@ Eigen::Vector3f lookingDirection(const Prepared& p) {
   return -p.camera.world_from_camera.linear().col(2).cast<float>();
 }
 
-LightFit lightOf(const std::vector<View>& views, const Background& seen, bool any_moves,
-                 const RenderParams& params, const Prepared& p) {
+// @param seen used if any object moves
+LightPictures lightPictures(const std::vector<View>& views, const Background& seen, bool any_moves,
+                            const RenderParams& params, const Prepared& p) {
+  return atWorkingSize(
+      {lightViewsOf(views), any_moves ? seen : Background(), params.depth, p.outline_blur});
+}
+
+LightFit lightOf(const LightPictures& pictures, const RenderParams& params, const Prepared& p) {
   LightEvidence evidence =
-      lightEvidence(views, p.moves, params.planes, any_moves ? seen : Background(), params.depth);
+      lightEvidence(pictures.views, p.moves, params.planes, pictures.plate, pictures.depth);
   evidence.borders = [&](const Eigen::Vector3f& l) {
-    return sunByBorders(views, params.planes, params.depth, l, p.outline_blur);
+    return sunByBorders(pictures.views, params.planes, pictures.depth, l, pictures.blur);
   };
   LightFit fit = fitLight(evidence, params.up.cast<float>(), lookingDirection(p));
   fit.light.angular_radius = static_cast<float>(params.sun_radius);
@@ -159,9 +166,10 @@ LightFit lightOf(const std::vector<View>& views, const Background& seen, bool an
 }
 
 // The light that explains the objects past what else keeps the sun off them.
-LightFit lightPastUnseen(const std::vector<View>& views, const RenderParams& params,
+LightFit lightPastUnseen(const LightPictures& pictures, const RenderParams& params,
                          const Prepared& p) {
-  LightEvidence evidence = lightEvidence(views, p.moves, params.planes, {}, params.depth);
+  LightEvidence evidence =
+      lightEvidence(pictures.views, p.moves, params.planes, {}, pictures.depth);
   evidence.known_sun = p.light.light.direction;
   const auto clear = [&](const LightSample& s) {
     const float sun = p.unseen_shade.visibility(s.position, s.normal);
@@ -181,9 +189,8 @@ LightFit lightPastUnseen(const std::vector<View>& views, const RenderParams& par
 }
 
 // Light and objects again once that is known.
-void learnPastUnseen(const std::vector<View>& views, const std::vector<View>& light_views,
-                     const RenderParams& params, Prepared& p) {
-  p.light = lightPastUnseen(light_views, params, p);
+void learnPastUnseen(const std::vector<View>& views, const RenderParams& params, Prepared& p) {
+  p.light = lightPastUnseen(lightPictures(views, {}, false, params, p), params, p);
   p.appearances =
       makeAppearances(views, p.moves, p.light.light, p.light.glosses(clothAmong(p.surfaces)),
                       params.planes, p.unseen_shade);
@@ -268,7 +275,7 @@ Prepared prepare(const ClipSample& given_clip, const std::vector<ObjectModel>& m
   if (p.camera_moves) sharpenSeen(frames, params.background, seen);
   p.background_ms = watch.lap();
   std::vector<View> views = viewsOf(clip, p, picture);
-  p.light = lightOf(lightViewsOf(views), seen, any_moves, params, p);
+  p.light = lightOf(lightPictures(views, seen, any_moves, params, p), params, p);
   if (addDetails(views.front(), params.depth, p.nearness, models, p.surfaces))
     views = viewsOf(clip, p, picture);
   const std::vector<View> light_views = lightViewsOf(views);
@@ -292,7 +299,7 @@ Prepared prepare(const ClipSample& given_clip, const std::vector<ObjectModel>& m
   if (p.camera_moves && !p.background.drifting.established())
     p.beside = platesBeside(covered, p.nearness, any_moves, params.background);
   p.background_ms += watch.lap();
-  if (!p.unseen_shade.empty()) learnPastUnseen(views, light_views, params, p);
+  if (!p.unseen_shade.empty()) learnPastUnseen(views, params, p);
   p.appearance_ms += watch.lap();
   p.noise = noiseOf(frames, steadiness, p);
   p.blank_frames = static_cast<int>(given_clip.frames().size() - clip.frames().size());
