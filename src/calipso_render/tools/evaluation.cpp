@@ -16,9 +16,10 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kSeam = 3;     // px on either side of the silhouette
-constexpr int kRim = 3;      // px of a mask's rim that "inside" leaves out
-constexpr int kAround = 40;  // px around a moved object in which its shadow is judged
+constexpr int kSeam = 3;  // px on either side of the silhouette
+constexpr int kRim = 3;   // px of a mask's rim that "inside" leaves out
+constexpr int kAroundPart =
+    16;  // of the picture's width: around a moved object its shadow is judged
 // frames of a moving object that are drawn again: odd ones, which a clip sample of more than 24
 // frames leaves out
 constexpr int kMovedFirst = 3, kMovedStep = 4;
@@ -322,7 +323,7 @@ class Evaluation {
       keepLowest(seam, psnr(drawn, in.bgr, rim(mask, kSeam)));
       keepLowest(clip_seam, psnr(with_clip, in.bgr, rim(mask, kSeam)));
       picture("clip_moved_" + std::to_string(k), with_clip);
-      keepLowest(around, psnr(drawn, in.bgr, grow(mask, kAround) & ~grow(mask, 2)));
+      keepLowest(around, psnr(drawn, in.bgr, grow(mask, mask.cols / kAroundPart) & ~grow(mask, 2)));
       picture("moved_" + std::to_string(k), drawn);
     }
     put("moved_psnr_db", moved);
