@@ -92,6 +92,33 @@ TEST(DriftingBackground, IsFollowedBesideWhatRests) {
   EXPECT_LT(cv::countNonZero(drifting.where().colRange(0, kTrim - 3)), 10) << "the trim rests";
 }
 
+std::vector<ClipFrame> enlarged(std::vector<ClipFrame> frames, int times, int by) {
+  for (ClipFrame& f : frames) {
+    cv::resize(f.bgr, f.bgr, {}, times, times, by);
+    cv::resize(f.labels, f.labels, {}, times, times, cv::INTER_NEAREST);
+    f.camera.width *= times, f.camera.height *= times;
+  }
+  return frames;
+}
+
+// Where a large picture drifts is told in a reduced one, how far in itself.
+TEST(DriftingBackground, IsFoundInLargePicturesAsInSmallOnes) {
+  const std::vector<ClipFrame> frames = enlarged(clipOf(Motion::kDrifts), 2, cv::INTER_LINEAR);
+  const DriftingBackground small(frames, 2, cv::Mat()),
+      large(enlarged(frames, 2, cv::INTER_NEAREST), 2, cv::Mat());
+  ASSERT_TRUE(small.established() && large.established());
+  cv::Mat wanted;
+  cv::resize(small.where(), wanted, {}, 2, 2, cv::INTER_NEAREST);
+  ASSERT_EQ(large.where().size(), wanted.size());
+  EXPECT_LT(cv::countNonZero(large.where() != wanted), 0.001 * wanted.total());
+  for (const int k : {1, 6, 12}) {
+    const auto shift = large.shiftAt(33'000'000LL * k);
+    ASSERT_TRUE(shift);
+    EXPECT_NEAR(shift->x, 4.0f * kPace.x * k, 0.1) << k;
+    EXPECT_NEAR(shift->y, 4.0f * kPace.y * k, 0.1) << k;
+  }
+}
+
 TEST(DriftingBackground, WhatOtherFramesShowBesideTheObjectIsSeenWhereItIsNow) {
   const cv::Rect narrow(140, 70, 14, 60);  // the clouds come by it within the clip
   const DriftingBackground drifting(clipOf(Motion::kDrifts, narrow), 2, cv::Mat());

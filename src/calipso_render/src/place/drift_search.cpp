@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "place/drift_extent.hpp"
+#include "working_size.hpp"
 
 namespace calipso::render {
 namespace {
@@ -154,18 +155,27 @@ cv::Point2f refine(const DriftPicture& from, const DriftPicture& to, const cv::M
 
 // How far the picture has come in every frame. Frames are registered to a reference: the first one,
 // and whenever less than two thirds of the picture are shared with it, the frame before.
-std::vector<cv::Point2f> followed(const std::vector<DriftPicture>& pictures,
-                                  const cv::Point2f& pace, const cv::Mat& where) {
+// @param expected of a frame, from those before it
+template <typename Expected>
+std::vector<cv::Point2f> registered(const std::vector<DriftPicture>& pictures, const cv::Mat& where,
+                                    const Expected& expected) {
   std::vector<cv::Point2f> shifts(pictures.size());
   std::size_t from = 0;
   for (std::size_t i = 1; i < pictures.size(); ++i) {
-    const cv::Point2f expected = i == 1 ? pace : shifts[i - 1] + (shifts[i - 1] - shifts[i - 2]);
-    if (std::abs(expected.x - shifts[from].x) > static_cast<float>(pictures[i].grey.cols) / 3.0f ||
-        std::abs(expected.y - shifts[from].y) > static_cast<float>(pictures[i].grey.rows) / 3.0f)
+    const cv::Point2f at = expected(i, shifts);
+    if (std::abs(at.x - shifts[from].x) > static_cast<float>(pictures[i].grey.cols) / 3.0f ||
+        std::abs(at.y - shifts[from].y) > static_cast<float>(pictures[i].grey.rows) / 3.0f)
       from = i - 1;
-    shifts[i] = shifts[from] + refine(pictures[from], pictures[i], where, expected - shifts[from]);
+    shifts[i] = shifts[from] + refine(pictures[from], pictures[i], where, at - shifts[from]);
   }
   return shifts;
+}
+
+std::vector<cv::Point2f> followed(const std::vector<DriftPicture>& pictures,
+                                  const cv::Point2f& pace, const cv::Mat& where) {
+  return registered(pictures, where, [&](std::size_t i, const std::vector<cv::Point2f>& shifts) {
+    return i == 1 ? pace : shifts[i - 1] + (shifts[i - 1] - shifts[i - 2]);
+  });
 }
 
 // Where the first picture comes nearer to the second one by a displacement than at rest. CV_8UC1
@@ -186,6 +196,56 @@ Drift driftNear(const std::vector<DriftPicture>& pictures, const cv::Point2f& pa
   Drift drift{followed(pictures, pace, only), {}};
   drift.where = whereDrifting(pictures, drift.shifts, ground);
   return drift;
+}
+
+// What is covered shows farther in them, as they are smoothed.
+std::vector<DriftPicture> picturesOf(const std::vector<ClipFrame>& frames,
+                                     const std::vector<cv::Mat>& covered, int times) {
+  std::vector<DriftPicture> pictures(frames.size());
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    DriftPicture& picture = pictures[i];
+    cv::dilate(times == 1 ? covered[i] : cv::Mat(reducedMeans(covered[i] != 0, times) > 0),
+               picture.covered, cv::Mat::ones(7, 7, CV_8U));
+    cv::cvtColor(reducedMeans(frames[i].bgr, times), picture.grey, cv::COLOR_BGR2GRAY);
+    picture.grey.convertTo(picture.grey, CV_32F);
+    cv::GaussianBlur(picture.grey, picture.grey, {}, 1.0);
+  }
+  return pictures;
+}
+
+cv::Mat offBorders(const cv::Mat& where, int px) {
+  cv::Mat within;
+  cv::erode(where, within, cv::Mat::ones(2 * px + 1, 2 * px + 1, CV_8U));
+  return within;
+}
+
+Drift driftOf(const std::vector<DriftPicture>& pictures, const cv::Mat& ground) {
+  // The longest time over which a guess succeeds says best how fast it is.
+  for (std::size_t last = pictures.size() - 1; last > 0; last /= 2) {
+    const auto way = guess(pictures.front(), pictures[last]);
+    if (!way) continue;
+    const cv::Point2f pace = *way / static_cast<float>(last);
+    Drift drift = driftNear(pictures, pace, cv::Mat(), ground);
+    if (drift.where.empty()) {  // most of the picture may rest
+      const cv::Mat explained = explainedBy(pictures.front(), pictures[last], *way);
+      drift = driftNear(pictures, pace, explained, ground);
+    }
+    if (drift.where.empty()) return {};
+    drift.shifts = followed(pictures, pace, offBorders(drift.where, kOff));
+    const cv::Point2f whole = drift.shifts.back();
+    return std::hypot(whole.x, whole.y) >= kLeastWay ? drift : Drift();
+  }
+  return {};
+}
+
+// A mask of a reduced picture, for the whole one.
+cv::Mat enlarged(const cv::Mat& mask, const cv::Size& whole, int times) {
+  cv::Mat out;
+  cv::resize(mask, out, mask.size() * times, 0.0, 0.0, cv::INTER_NEAREST);
+  cv::copyMakeBorder(out, out, 0, whole.height - out.rows, 0, whole.width - out.cols,
+                     cv::BORDER_REPLICATE);
+  return out;
 }
 
 }  // namespace
@@ -211,33 +271,15 @@ cv::Mat displaced(const cv::Mat& image, const cv::Point2f& by, const cv::Size& o
 
 Drift findDrift(const std::vector<ClipFrame>& frames, const std::vector<cv::Mat>& covered,
                 const cv::Mat& ground) {
-  std::vector<DriftPicture> pictures(frames.size());
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    DriftPicture& picture = pictures[i];  // smoothed, what is covered shows farther
-    cv::dilate(covered[i], picture.covered, cv::Mat::ones(7, 7, CV_8U));
-    cv::cvtColor(frames[i].bgr, picture.grey, cv::COLOR_BGR2GRAY);
-    picture.grey.convertTo(picture.grey, CV_32F);
-    cv::GaussianBlur(picture.grey, picture.grey, {}, 1.0);
-  }
-  // The longest time over which a guess succeeds says best how fast it is.
-  for (std::size_t last = pictures.size() - 1; last > 0; last /= 2) {
-    const auto way = guess(pictures.front(), pictures[last]);
-    if (!way) continue;
-    const cv::Point2f pace = *way / static_cast<float>(last);
-    Drift drift = driftNear(pictures, pace, cv::Mat(), ground);
-    if (drift.where.empty()) {  // most of the picture may rest
-      const cv::Mat explained = explainedBy(pictures.front(), pictures[last], *way);
-      drift = driftNear(pictures, pace, explained, ground);
-    }
-    if (drift.where.empty()) return {};
-    cv::Mat within;  // off the borders of what rests
-    cv::erode(drift.where, within, cv::Mat::ones(2 * kOff + 1, 2 * kOff + 1, CV_8U));
-    drift.shifts = followed(pictures, pace, within);
-    const cv::Point2f whole = drift.shifts.back();
-    return std::hypot(whole.x, whole.y) >= kLeastWay ? drift : Drift();
-  }
-  return {};
+  const int times = timesTooLarge(frames.front().bgr.size());
+  Drift drift = driftOf(picturesOf(frames, covered, times), reducedValues(ground, times));
+  if (times == 1 || drift.where.empty()) return drift;
+  const std::vector<cv::Point2f> about = drift.shifts;
+  drift.where = enlarged(drift.where, frames.front().bgr.size(), times);
+  drift.shifts =
+      registered(picturesOf(frames, covered, 1), offBorders(drift.where, times * kOff),
+                 [&](std::size_t i, const auto&) { return about[i] * static_cast<float>(times); });
+  return drift;
 }
 
 }  // namespace calipso::render

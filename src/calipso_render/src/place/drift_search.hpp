@@ -13,7 +13,7 @@ struct Drift {
 };
 
 // A movement that a part of the picture makes as a whole. It is established if it explains most of
-// what changes from frame to frame.
+// what changes from frame to frame. Large pictures are searched reduced, and then followed exactly.
 // @param covered per frame, CV_8UC1, != 0: the place is not seen
 // @param ground CV_8UC1, may be empty, != 0: what does not clearly drift there rests
 Drift findDrift(const std::vector<ClipFrame>& frames, const std::vector<cv::Mat>& covered,
