@@ -11,8 +11,8 @@
 namespace calipso::align {
 namespace {
 
-constexpr int kMeanSize = 4;         // px; of a block
-constexpr int kLeastFlowWidth = 32;  // px; DIS wants a few of its patches
+constexpr double kUsualSide = 640.0;  // px of a picture's longer side, that TrackerParams are for
+constexpr int kLeastFlowWidth = 32;   // px; DIS wants a few of its patches
 // px; from here on half the resolution tells how a layer moves nearly as well
 constexpr int kLargeView = 200;
 
@@ -38,18 +38,26 @@ cv::Rect around(const cv::Mat& mask, int margin) {
   return box.empty() ? box : grown(box, margin) & cv::Rect(cv::Point(), mask.size());
 }
 
-cv::Mat blockMeans(const cv::Mat& image) {
+TrackerParams forPicture(const cv::Size& size, TrackerParams params) {
+  const int times =
+      std::max(1, static_cast<int>(std::lround(std::max(size.width, size.height) / kUsualSide)));
+  params.search_px *= times, params.block_px *= times;
+  return params;
+}
+
+cv::Mat blockMeans(const cv::Mat& image, int block_px) {
   cv::Mat means;
-  cv::resize(image, means, cv::Size(), 1.0 / kMeanSize, 1.0 / kMeanSize, cv::INTER_AREA);
+  cv::resize(image, means, cv::Size(), 1.0 / block_px, 1.0 / block_px, cv::INTER_AREA);
   return means;
 }
 
 bool isStill(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& reference_means,
              const TrackerParams& params) {
-  const cv::Rect roi = around(mask, params.band_px + kMeanSize);
+  const int block = params.block_px;
+  const cv::Rect roi = around(mask, params.band_px + block);
   if (roi.empty()) return true;
-  const cv::Rect cells((roi.x + kMeanSize - 1) / kMeanSize, (roi.y + kMeanSize - 1) / kMeanSize,
-                       roi.width / kMeanSize - 1, roi.height / kMeanSize - 1);
+  const cv::Rect cells((roi.x + block - 1) / block, (roi.y + block - 1) / block,
+                       roi.width / block - 1, roi.height / block - 1);
   const cv::Rect part = cells & cv::Rect(cv::Point(), means.size());
   if (part.empty()) return false;
   cv::Mat difference, changed, cell_mask;
@@ -61,10 +69,10 @@ bool isStill(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& reference
   return cv::countNonZero(changed) <= params.still_share * counted;
 }
 
-cv::Mat foreignBlocks(const cv::Mat& means, const KnownBackground& background) {
+cv::Mat foreignBlocks(const cv::Mat& means, const KnownBackground& background, int block_px) {
   constexpr float kNoise = 3.0f;        // grey levels, of a block's mean and of what moves a bit
   constexpr double kMostForeign = 0.1;  // of the picture
-  cv::Mat known, behind = blockMeans(background.image);
+  cv::Mat known, behind = blockMeans(background.image, block_px);
   cv::resize(background.known, known, means.size(), 0, 0, cv::INTER_AREA);
   cv::Mat foreign(means.size(), CV_8U, cv::Scalar(255));
   for (int y = 0; y < means.rows; ++y)
@@ -81,14 +89,16 @@ cv::Mat foreignBlocks(const cv::Mat& means, const KnownBackground& background) {
 }
 
 cv::Point coarseShift(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& previous_means,
-                      const cv::Mat& foreign, int search_px) {
+                      const cv::Mat& foreign, const TrackerParams& params) {
+  const int block = params.block_px;
   constexpr double kLeastForeign = 0.5;  // of what there is of it in the best place
   const cv::Rect box = cv::boundingRect(mask);
   if (box.empty()) return {};
   const cv::Rect cells =
-      cv::Rect(box.tl() / kMeanSize, box.size() / kMeanSize) & cv::Rect(cv::Point(), means.size());
+      cv::Rect(box.tl() / block, box.size() / block) & cv::Rect(cv::Point(), means.size());
   if (cells.width < 2 || cells.height < 2) return {};
-  const cv::Rect search = grown(cells, search_px / kMeanSize) & cv::Rect(cv::Point(), means.size());
+  const cv::Rect search =
+      grown(cells, params.search_px / block) & cv::Rect(cv::Point(), means.size());
   cv::Mat weight, score;
   cv::resize(mask, weight, means.size(), 0, 0, cv::INTER_AREA);
   cv::matchTemplate(means(search), previous_means(cells), score, cv::TM_SQDIFF, weight(cells));
@@ -102,7 +112,7 @@ cv::Point coarseShift(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& 
   cv::minMaxLoc(score, nullptr, nullptr, &best, nullptr, cv::Mat(met >= kLeastForeign * most));
   const cv::Point moved = search.tl() + best - cells.tl();
   // Motion of a cell or two is the flow's to find.
-  return std::abs(moved.x) > 2 || std::abs(moved.y) > 2 ? moved * kMeanSize : cv::Point();
+  return std::abs(moved.x) > 2 || std::abs(moved.y) > 2 ? moved * block : cv::Point();
 }
 
 cv::Mat backwardFlow(const cv::Mat& grey, const cv::Mat& previous_grey, const cv::Mat& mask,

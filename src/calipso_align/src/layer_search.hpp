@@ -14,9 +14,13 @@ cv::Rect grown(const cv::Rect& rect, int px);
 // The part of the picture around a mask; empty where the mask is.
 cv::Rect around(const cv::Mat& mask, int margin);
 
+// Parameters that are given for 640 px of a picture's longer side, for one of this size: in larger
+// pictures objects go as many times as far.
+TrackerParams forPicture(const cv::Size& size, TrackerParams params);
+
 // Means over small blocks, which average the sensor's noise away: what stillness and large motions
 // are told by.
-cv::Mat blockMeans(const cv::Mat& image);
+cv::Mat blockMeans(const cv::Mat& image, int block_px);
 
 // Whether nothing changed in an object and its rim since the frame of `reference_means`.
 bool isStill(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& reference_means,
@@ -24,12 +28,12 @@ bool isStill(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& reference
 
 // Blocks (CV_8U, as blockMeans()) that a known background does not account for, lit or shaded; all
 // of them where so much differs that the background cannot be relied on.
-cv::Mat foreignBlocks(const cv::Mat& means, const KnownBackground& background);
+cv::Mat foreignBlocks(const cv::Mat& means, const KnownBackground& background, int block_px);
 
 // Translation of an object since the previous frame: best match of its pixels on a coarse picture,
 // where there is something foreign; none where that is little enough to be the flow's to find.
 cv::Point coarseShift(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& previous_means,
-                      const cv::Mat& foreign, int search_px);
+                      const cv::Mat& foreign, const TrackerParams& params);
 
 // Backward flow, current to previous frame, near where an object went; `shift` elsewhere. What the
 // object moved as a whole is taken out first: the flow then has only the rest to find.

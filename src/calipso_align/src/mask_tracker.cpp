@@ -61,11 +61,11 @@ struct MaskTracker::Layers {
 
 MaskTracker::MaskTracker(const cv::Mat& image, const cv::Mat& labels,
                          const std::map<int, ModelSurface>& models, TrackerParams params)
-    : params_(params), size_(image.size()) {
+    : params_(forPicture(image.size(), params)), size_(image.size()) {
   checkInput(image, labels);
   previous_image_ = image.clone();
   cv::cvtColor(image, previous_grey_, cv::COLOR_BGR2GRAY);
-  previous_means_ = blockMeans(image);
+  previous_means_ = blockMeans(image, params_.block_px);
   std::set<int> found(labels.begin<uchar>(), labels.end<uchar>());
   found.erase(0);
   for (const int label : found) {
@@ -103,7 +103,7 @@ void MaskTracker::checkInput(const cv::Mat& image, const cv::Mat& labels) const 
 
 TrackedMask MaskTracker::track(const cv::Mat& image) {
   checkInput(image, {});
-  const cv::Mat means = blockMeans(image);
+  const cv::Mat means = blockMeans(image, params_.block_px);
   cv::Mat grey;
   cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
   std::vector<Object*> moving;
@@ -113,13 +113,13 @@ TrackedMask MaskTracker::track(const cv::Mat& image) {
   occupied_ = cv::Mat::zeros(size_, CV_8U);
   for (const Object& object : objects_) occupied_ |= object.mask;
   as_before_ = asBeforeAround(moving, image);
-  const cv::Mat foreign = moving.empty() ? cv::Mat() : foreignBlocks(means, background_);
+  const cv::Mat foreign =
+      moving.empty() ? cv::Mat() : foreignBlocks(means, background_, params_.block_px);
 // A single object leaves the processors to the loops over its pixels.
 #pragma omp parallel for schedule(dynamic) if (moving.size() > 1)
   for (size_t k = 0; k < moving.size(); ++k) {
     Object* object = moving[k];
-    const cv::Point shift =
-        coarseShift(object->mask, means, previous_means_, foreign, params_.search_px);
+    const cv::Point shift = coarseShift(object->mask, means, previous_means_, foreign, params_);
     const cv::Mat flow =
         backwardFlow(grey, previous_grey_, object->mask, shift, params_.margin_px, *object->flow);
     cv::Mat rough = roughlyMoved(object->mask, flow, shift, params_.margin_px);

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/imgproc.hpp>
 #include <string>
 
+#include "../src/layer_search.hpp"
 #include "synthetic_picture.hpp"
 
 namespace calipso::align {
@@ -16,22 +18,34 @@ using testing::maskOf;
 const cv::Size kSize(200, 150);
 
 // A disc with stripes, so that the flow sees it move, on a background with a gradient.
-cv::Mat picture(double u0, double v0, int seed) {
-  cv::Mat image(kSize, CV_8UC3);
+cv::Mat picture(double u0, double v0, int seed, const cv::Size& size = kSize, double noise = 2.0) {
+  cv::Mat image(size, CV_8UC3);
   cv::RNG rng(seed);
-  for (int v = 0; v < kSize.height; ++v)
-    for (int u = 0; u < kSize.width; ++u) {
+  for (int v = 0; v < size.height; ++v)
+    for (int u = 0; u < size.width; ++u) {
       const double alpha = std::clamp(0.5 - disc(u0, v0, 25)(u, v), 0.0, 1.0);
       const double stripe = 30.0 * std::sin(0.5 * (u - u0) + 0.3 * (v - v0));
       const cv::Vec3d fore(50, 90 + stripe, 190), back(150 + 0.2 * u, 150 + 0.2 * v, 140);
       for (int c = 0; c < 3; ++c)
-        image.at<cv::Vec3b>(v, u)[c] =
-            cv::saturate_cast<uchar>(alpha * fore[c] + (1.0 - alpha) * back[c] + rng.gaussian(2.0));
+        image.at<cv::Vec3b>(v, u)[c] = cv::saturate_cast<uchar>(
+            alpha * fore[c] + (1.0 - alpha) * back[c] + rng.gaussian(noise));
     }
   return image;
 }
 
 cv::Mat truth(double u0, double v0) { return maskOf(kSize, disc(u0, v0, 25)); }
+
+// The same twice as large, so that its noise is, too.
+const cv::Size kUsual(640, 480);
+cv::Mat largePicture(double u0, double v0, int seed) {
+  cv::Mat large;
+  cv::resize(picture(u0, v0, seed, kUsual, 3.0), large, kUsual * 2, 0, 0, cv::INTER_CUBIC);
+  return large;
+}
+
+cv::Mat largeTruth(double u0, double v0) {
+  return maskOf(kUsual * 2, disc(2 * u0 + 0.5, 2 * v0 + 0.5, 50));
+}
 
 TEST(MaskTracker, FollowsATranslation) {
   MaskTracker tracker(picture(60, 60, 1), truth(60, 60) / 255);
@@ -54,6 +68,29 @@ TEST(MaskTracker, AStillObjectKeepsItsMaskExactly) {
   MaskTracker tracker(picture(60, 60, 1), labels);
   for (int k = 2; k < 6; ++k) {
     const TrackedMask tracked = tracker.track(picture(60, 60, k));  // other noise, same scene
+    EXPECT_EQ(cv::countNonZero(tracked.labels != labels), 0);
+    EXPECT_EQ(tracked.confidence, 1.0f);
+  }
+}
+
+// What goes 80 px in a frame goes 160 px if the picture is twice as large.
+TEST(CoarseShift, FindsAJumpInALargePicture) {
+  const TrackerParams params = forPicture(kUsual * 2, {});
+  const auto means = [&](double u0, double v0, int seed) {
+    return blockMeans(largePicture(u0, v0, seed), params.block_px);
+  };
+  const cv::Mat before = means(100, 100, 1);
+  const cv::Point shift = coarseShift(largeTruth(100, 100), means(180, 140, 2), before,
+                                      cv::Mat(before.size(), CV_8U, cv::Scalar(255)), params);
+  EXPECT_NEAR(shift.x, 160, params.block_px);
+  EXPECT_NEAR(shift.y, 80, params.block_px);
+}
+
+TEST(MaskTracker, AStillObjectKeepsItsMaskInALargePicture) {
+  const cv::Mat labels = largeTruth(100, 100) / 255;
+  MaskTracker tracker(largePicture(100, 100, 1), labels);
+  for (int k = 2; k < 5; ++k) {
+    const TrackedMask tracked = tracker.track(largePicture(100, 100, k));
     EXPECT_EQ(cv::countNonZero(tracked.labels != labels), 0);
     EXPECT_EQ(tracked.confidence, 1.0f);
   }

@@ -15,12 +15,15 @@ namespace calipso::align {
 
 struct LayerAppearance;
 
+// Search and block are for 640 px of the picture's longer side; MaskTracker multiplies them for larger
+// pictures.
 struct TrackerParams {
   int components = 5;          // Gaussians per colour model
   int margin_px = 40;          // surroundings of an object that are looked at
   int band_px = 5;             // the outline is looked for this close to where the flow puts it
   int search_px = 96;          // how far an object can go from one frame to the next
-  float still_levels = 5.0f;   // grey levels; what changes less than this (4 x 4 px mean) is still
+  int block_px = 4;            // side of the squares whose means tell stillness and large motions
+  float still_levels = 5.0f;   // grey levels; means that change less than this are still
   float still_share = 0.002f;  // ... in all but this share of the object and its rim
   float prior_cost = 2.0f;     // nats per pixel of distance from the predicted outline
   // nats; the most that the prediction says, unless the background contradicts it
@@ -64,7 +67,7 @@ class MaskTracker {
     cv::Mat mask;                    // CV_8U, the whole picture
     cv::Mat expected;                // CV_8U, where its motion alone has put it
     cv::Mat coverage;        // CV_8U, as `mask` but with the share of the pixels along its edge
-    cv::Mat reference_mean;  // 4 x 4 px means of the frame in which `mask` was found
+    cv::Mat reference_mean;  // means of squares of the frame in which `mask` was found
     int key_area = 0;        // px
     float confidence = 1.0f;
     cv::Ptr<cv::DISOpticalFlow> flow;  // has buffers of its own
