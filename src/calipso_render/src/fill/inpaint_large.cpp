@@ -2,19 +2,13 @@
 #include <opencv2/imgproc.hpp>
 
 #include "fill/inpaint_at_size.hpp"
+#include "working_size.hpp"
 
 namespace calipso::render {
 namespace {
 
-// px of a picture's longer side, about, at which what is sought for filling (lines, patterns, planes
-// and patches) has the size that it is sought with
-constexpr int kWorkingSide = 640;
-
-int timesTooLarge(const cv::Size& size) {
-  return std::max(1, (std::max(size.width, size.height) + kWorkingSide / 2 - 1) / kWorkingSide);
-}
-
-// From a picture that is `times` as large, and what is known of it, to one of about kWorkingSide.
+// From a picture that is `times` as large, and what is known of it, to the one that is filled: there
+// lines, patterns, planes and patches have the size that they are sought with.
 class Reduction {
  public:
   Reduction(const cv::Size& large, int times)
