@@ -12,6 +12,12 @@ inline cv::Mat grain(int width, int height) {
   return image;
 }
 
+// Its left part again at the right, `period` px on.
+inline cv::Mat repeated(cv::Mat image, int period) {
+  for (int u = period; u < image.cols; ++u) image.col(u - period).copyTo(image.col(u));
+  return image;
+}
+
 inline double meanDifference(const cv::Mat& a, const cv::Mat& b, const cv::Mat& mask) {
   cv::Mat difference;
   cv::absdiff(a, b, difference);

@@ -11,8 +11,6 @@
 
 #include "fill/band_turns.hpp"
 #include "fill/patch_fill.hpp"
-#include "fill/seam_blend.hpp"
-#include "fill/seam_cut.hpp"
 #include "grain_pictures.hpp"
 
 namespace calipso::render {
@@ -25,12 +23,6 @@ cv::Mat spots(int width, int height) {
   cv::Mat image = grain(width, height), smooth;
   cv::GaussianBlur(image, smooth, {0, 0}, 5.0);
   return 8.0 * (smooth - cv::Scalar::all(120.0)) + 0.5 * image + cv::Scalar::all(60.0);
-}
-
-// Its left part again at the right, `period` px on.
-cv::Mat repeated(cv::Mat image, int period) {
-  for (int u = period; u < image.cols; ++u) image.col(u - period).copyTo(image.col(u));
-  return image;
 }
 
 TEST(PatchOrigins, AreWhereThePictureRepeatsItself) {
@@ -223,83 +215,6 @@ TEST(PatchOrigins, HaveNoneWhereNoPatchIsWhole) {
                 source = cv::Mat::zeros(40, 40, CV_8U);
   const cv::Mat origin = patchOrigins(image, hole, source, {}, {});
   EXPECT_EQ(cv::countNonZero(origin.reshape(1) != -1), 0);
-}
-
-// A hole at columns 100 to 139 that two copies fill, which are alike in columns 117 to 119 alone.
-TEST(CutSeams, MoveToWhereCopiesAreAlike) {
-  cv::Mat image = grain(240, 24);
-  const int way = 60, first = 100, last = 139;
-  for (int u = 117; u <= 119; ++u) image.col(u - way).copyTo(image.col(u + way));
-  image.col(first - 1).copyTo(image.col(first - 1 - way));
-  image.col(last + 1).copyTo(image.col(last + 1 + way));
-  cv::Mat hole = cv::Mat::zeros(image.size(), CV_8U), origin(image.size(), CV_16SC2, {-1, -1});
-  hole.colRange(first, last + 1).setTo(255);
-  for (int v = 0; v < image.rows; ++v) {
-    for (int u = first; u <= last; ++u)
-      origin.at<cv::Vec2s>(v, u) = {static_cast<short>(u < 113 ? u - way : u + way),
-                                    static_cast<short>(v)};
-  }
-  cutSeams(image, hole, hole == 0, hole == 0, InpaintParams(), origin);
-  for (int v = 0; v < image.rows; ++v) {
-    for (int u = first; u <= last; ++u) {
-      const bool from_left = origin.at<cv::Vec2s>(v, u)[0] < u;
-      const bool alike = u >= 117 && u <= 119;
-      EXPECT_TRUE(alike || from_left == (u < 117)) << u << ", " << v;
-    }
-  }
-}
-
-// A row of a picture whose left half is darker by a step, blended.
-std::vector<float> blendedStep(float step, const cv::Mat& planes, const cv::Mat& sky = {}) {
-  cv::Mat image(40, 120, CV_32FC3, cv::Scalar::all(50)), hole = cv::Mat::zeros(40, 120, CV_8U);
-  image.colRange(60, 120).setTo(cv::Scalar::all(50.0 + step));
-  hole.colRange(30, 90).setTo(255);
-  cv::Mat origin(40, 120, CV_16SC2, {-1, -1}), row;
-  for (int v = 0; v < 40; ++v) {
-    for (int u = 30; u < 90; ++u)
-      origin.at<cv::Vec2s>(v, u) = {static_cast<short>(u < 60 ? 10 : 105), static_cast<short>(v)};
-  }
-  blendSeams(hole, hole == 0, origin, planes, sky, image);
-  cv::extractChannel(image.row(20), row, 0);
-  return row;
-}
-
-// A step that is too high for a seam keeps its place, but not its edge.
-TEST(BlendSeams, SoftenAStepBetweenThings) {
-  const std::vector<float> at = blendedStep(150.0f, cv::Mat());
-  EXPECT_LT(at[60] - at[59], 75.0f);
-  EXPECT_NEAR(at[50], 50.0f, 12.0f);
-  EXPECT_NEAR(at[70], 200.0f, 12.0f);
-}
-
-TEST(BlendSeams, SpreadAnyStepInTheSky) {
-  const cv::Mat sky(40, 120, CV_8U, cv::Scalar(InpaintParams::kSky));
-  const std::vector<float> at = blendedStep(60.0f, cv::Mat(), sky);
-  for (int u = 1; u < 120; ++u) EXPECT_LT(at[u] - at[u - 1], 6.0f) << u;
-}
-
-TEST(BlendSeams, KeepTheEdgeBetweenPlanes) {
-  cv::Mat planes(40, 120, CV_8U, cv::Scalar(1));
-  planes.colRange(60, 120).setTo(2);
-  for (const float step : {10.0f, 150.0f})
-    EXPECT_NEAR(blendedStep(step, planes)[60] - blendedStep(step, planes)[59], step, 1e-3f);
-}
-
-TEST(BlendSeams, SpreadsAStepAndKeepsTheGrain) {
-  // A copy of the left part, 3 code values too dark, between two parts that fit.
-  const cv::Mat truth = repeated(grain(120, 30), 40);
-  cv::Mat hole = cv::Mat::zeros(30, 120, CV_8U), origin(30, 120, CV_16SC2, cv::Scalar(-1, -1)),
-          image = truth.clone();
-  hole(cv::Rect(50, 5, 20, 20)).setTo(255);
-  for (int v = 5; v < 25; ++v) {
-    for (int u = 50; u < 70; ++u) origin.at<cv::Vec2s>(v, u) = cv::Vec2s(short(u - 40), short(v));
-  }
-  const cv::Mat exact = image.clone();
-  blendSeams(hole, hole == 0, origin, cv::Mat(), cv::Mat(), image);
-  EXPECT_LT(cv::norm(image, exact, cv::NORM_INF), 1e-3);  // what fits stays
-  cv::subtract(image, cv::Scalar::all(3.0), image, hole);
-  blendSeams(hole, hole == 0, origin, cv::Mat(), cv::Mat(), image);
-  EXPECT_LT(meanDifference(image, truth, hole), 0.5);
 }
 
 TEST(Inpaint, ContinuesWhatRepeatsItself) {

@@ -16,10 +16,9 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kSeam = 3;  // px on either side of the silhouette
-constexpr int kRim = 3;   // px of a mask's rim that "inside" leaves out
-constexpr int kAroundPart =
-    16;  // of the picture's width: around a moved object its shadow is judged
+constexpr int kSeam = 3;         // px on either side of the silhouette
+constexpr int kRim = 3;          // px of a mask's rim that "inside" leaves out
+constexpr int kAroundPart = 16;  // of the picture's width, around a moved object: its shadow
 // frames of a moving object that are drawn again: odd ones, which a clip sample of more than 24
 // frames leaves out
 constexpr int kMovedFirst = 3, kMovedStep = 4;
@@ -28,11 +27,6 @@ constexpr int kFlickerFrames = 8;
 constexpr int kSummaryWidth = 1440;  // px
 constexpr int kSheetFrames = 4;      // of a clip on a blind sheet
 constexpr double kFlickers = 0.3;    // code values of true change from which flicker is judged
-
-double elapsedMs(std::chrono::steady_clock::time_point since) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - since)
-      .count();
-}
 
 // Of what is edited.
 cv::Mat maskOf(const FrameInput& in, const std::vector<Surface>& surfaces) {

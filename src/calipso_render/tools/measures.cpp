@@ -86,6 +86,11 @@ cv::Mat shrink(const cv::Mat& mask, int radius) {
 
 cv::Mat rim(const cv::Mat& mask, int radius) { return grow(mask, radius) & ~shrink(mask, radius); }
 
+double elapsedMs(std::chrono::steady_clock::time_point since) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - since)
+      .count();
+}
+
 void keepLowest(std::optional<double>& lowest, std::optional<double> value) {
   if (value && (!lowest || *value < *lowest)) lowest = value;
 }

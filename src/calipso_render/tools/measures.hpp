@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <opencv2/core.hpp>
 #include <optional>
 
@@ -25,6 +26,8 @@ cv::Mat grow(const cv::Mat& mask, int radius);
 cv::Mat shrink(const cv::Mat& mask, int radius);
 // What lies within `radius` px of its outline.
 cv::Mat rim(const cv::Mat& mask, int radius);
+
+double elapsedMs(std::chrono::steady_clock::time_point since);
 
 void keepLowest(std::optional<double>& lowest, std::optional<double> value);
 
