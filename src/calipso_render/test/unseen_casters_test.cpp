@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/imgproc.hpp>
+
 #include "calipso_render/unseen_shade.hpp"
 #include "grain_pictures.hpp"
 #include "test_room.hpp"
@@ -67,6 +69,23 @@ TEST_F(UnseenCasters, ShadeSoftlyAsTheBrightnessHasIt) {
   EXPECT_NEAR(hiddenAt(kEdge + 6, 100), 51, 30);
   EXPECT_GT(hiddenAt(kEdge - 20, 100), 245);
   EXPECT_LT(hiddenAt(kEdge + 20, 100), 10);
+}
+
+// Light that grows over 50 px, more than a smaller picture's borders of shade have.
+TEST_F(UnseenCasters, ShadeLargePicturesAsSoftly) {
+  constexpr int kTimes = 5, kLargeEdge = kTimes * kEdge;
+  const cv::Size large = plate.size() * kTimes;
+  plate = 0.2 * grain(large.width, large.height) + cv::Scalar::all(150.0);
+  cv::resize(surface, surface, large, 0.0, 0.0, cv::INTER_NEAREST);
+  cv::resize(told, told, large, 0.0, 0.0, cv::INTER_NEAREST);
+  for (int u = 0; u < large.width; ++u) {
+    const double lit = std::clamp((u - kLargeEdge + 25) / 50.0, 0.0, 1.0);
+    plate.col(u) *= std::pow(0.22 + 0.78 * lit, 1.0 / 2.2);
+  }
+  EXPECT_NEAR(hiddenAt(kLargeEdge, 500), 128, 25);
+  EXPECT_NEAR(hiddenAt(kLargeEdge - 19, 500), 225, 20);
+  EXPECT_NEAR(hiddenAt(kLargeEdge + 19, 500), 30, 20);
+  EXPECT_GT(hiddenAt(kLargeEdge - 50, 500), 245);
 }
 
 TEST_F(UnseenCasters, AreNotSoughtByBrightnessThatDoesNotTell) {

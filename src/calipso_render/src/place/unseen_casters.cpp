@@ -8,6 +8,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "place/masked_quantile.hpp"
+#include "working_size.hpp"
 
 namespace calipso::render {
 namespace {
@@ -198,6 +199,15 @@ class Surfaces {
 }  // namespace
 
 CastersShade unseenCastersShade(const cv::Mat& told, const cv::Mat& plate, const cv::Mat& surface) {
+  const int times = told.empty() ? 1 : timesTooLarge(told.size());
+  if (times > 1) {
+    CastersShade shade = unseenCastersShade(reducedValues(told, times), reducedMeans(plate, times),
+                                            reducedValues(surface, times));
+    if (shade.hidden.empty()) return {};
+    cv::resize(shade.hidden, shade.hidden, told.size(), 0.0, 0.0, cv::INTER_LINEAR);
+    cv::resize(shade.known, shade.known, told.size(), 0.0, 0.0, cv::INTER_NEAREST);
+    return shade;
+  }
   if (told.empty() || cv::countNonZero(clearly(told, kNoSun, kSun)) < kFewest) return {};
   return Surfaces(told, plate, surface).find();
 }
