@@ -127,8 +127,8 @@ class FlowNodeTest : public testing::Test {
     for (const visualization_msgs::Marker& m : markers_.markers) {
       const bool is_list = m.type == visualization_msgs::Marker::SPHERE_LIST ||
                            m.type == visualization_msgs::Marker::LINE_STRIP;
-      if (is_list && m.action == visualization_msgs::Marker::ADD)
-        EXPECT_FALSE(m.points.empty()) << m.ns;
+      const bool shows_points = is_list && m.action == visualization_msgs::Marker::ADD;
+      EXPECT_FALSE(shows_points && m.points.empty()) << m.ns;
       taken_away |= m.ns == "box/collisions" && m.action == visualization_msgs::Marker::DELETE;
     }
     EXPECT_TRUE(taken_away);

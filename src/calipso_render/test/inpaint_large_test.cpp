@@ -52,10 +52,11 @@ TEST(InpaintLarge, KeepsTheGrain) {
   for (int v = 0; v < b.hole.rows; ++v) {
     for (int u = 0; u < b.hole.cols; ++u) {
       const cv::Vec2s from = filled.origin.at<cv::Vec2s>(v, u);
-      if (b.hole.at<std::uint8_t>(v, u) == 0)
+      if (b.hole.at<std::uint8_t>(v, u) == 0) {
         ASSERT_EQ(from, cv::Vec2s(-1, -1));
-      else if (from[0] >= 0)
+      } else if (from[0] >= 0) {
         ASSERT_EQ(b.hole.at<std::uint8_t>(from[1], from[0]), 0);
+      }
     }
   }
 }

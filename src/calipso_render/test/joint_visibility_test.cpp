@@ -56,8 +56,9 @@ TEST(JointVisibility, IsAsFineAsThatOfEach) {
       const Eigen::Vector3f at(x, y, 0.0f), up = Eigen::Vector3f::UnitZ();
       ASSERT_EQ(joint->visibility(at, up), alone->visibility(at, up));
       ASSERT_NEAR(sky_joint->visibility(at, up), sky_alone->visibility(at, up), 1e-3f);
-      if (const auto known = joint->uniform(at, up, 0.01f))
+      if (const auto known = joint->uniform(at, up, 0.01f)) {
         ASSERT_EQ(*known, joint->visibility(at, up));
+      }
       shaded += joint->visibility(at, up) < 0.5f;
     }
   }

@@ -322,7 +322,7 @@ TEST(PlaneView, AgreesWithTheReceiverOfEveryPixel) {
   const PlaneView view(planes, camera());
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
-      Receiver found{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
+      Receiver found;
       const bool seen = view.at(u, v, found);
       const auto expected = receiverAt(planes, camera(), u, v);
       ASSERT_EQ(seen, expected.has_value()) << u << ", " << v;

@@ -59,7 +59,7 @@ struct PoseMeasurement {
   struct Instant {
     double time, deviation;
   };
-  std::optional<Instant> contact;
+  std::optional<Instant> contact = std::nullopt;
 };
 
 enum class Travel { kRest, kUniform, kFreeFall, kAccelerated, kForced };

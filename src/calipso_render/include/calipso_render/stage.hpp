@@ -123,7 +123,8 @@ std::vector<bool> shownAnew(const std::vector<View>& views, const std::vector<bo
 
 // The support plane that pixel (u, v) of the camera looks at.
 struct Receiver {
-  Eigen::Vector3f position, normal;  // world
+  // world
+  Eigen::Vector3f position = Eigen::Vector3f::Zero(), normal = Eigen::Vector3f::Zero();
 };
 std::optional<Receiver> receiverAt(const std::vector<SupportPlane>& planes, const Camera& camera,
                                    float u, float v);

@@ -109,13 +109,13 @@ class Squares {
     explicit Lookup(const Squares& squares) : squares_(squares) {}
     // @param otherwise what is kept where neither plane nor relief is seen
     void add(float u, float v, float* visible, float otherwise = 1.0f) {
-      Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
+      Receiver r;
       *visible = otherwise;
       if (squares_.view_.at(u, v, r)) add(r, visible);
     }
     // What pixel (u, v) sees so far beside its centre.
     void addBeside(int u, int v, float du, float dv, float* visible) {
-      Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
+      Receiver r;
       *visible = 1.0f;
       if (squares_.view_.beside(u, v, du, dv, r)) add(r, visible);
     }
@@ -266,7 +266,7 @@ class Squares {
 
   // Does the surface that a pixel sees end beside it? Then the picture mixes both there.
   bool endsBeside(int u, int v) const {
-    Receiver own{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()}, other = own;
+    Receiver own, other;
     if (!view_.at(static_cast<float>(u), static_cast<float>(v), own)) return false;
     float least = std::numeric_limits<float>::max(), off = 0.0f;
     for (const cv::Point d : {cv::Point(1, 0), {0, 1}, {-1, 0}, {0, -1}}) {

@@ -27,7 +27,7 @@ class SkyLookup {
   SkyLookup(const PlaneView& planes, const Visibility& sky, const Store& store)
       : planes_(planes), sky_(sky), store_(store) {}
   void add(int u, int v, int number) {
-    Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
+    Receiver r;
     if (!planes_.at(u, v, r)) return;
     numbers_[batch_.add(r.position, r.normal)] = number;
     if (batch_.count() == LightBatch::kMost) look();
