@@ -1,4 +1,5 @@
 #include "calipso_ros/node_main.hpp"
+#include "calipso_scene/memory.hpp"
 #include "ros/guarded_main.hpp"
 #include "ros/player.hpp"
 
@@ -27,6 +28,7 @@ calipso::bag::Player::Params loadParams(const ros::NodeHandle& pnh) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  calipso::keepFreedMemory();
   ros::init(argc, argv, "player");
   ros::NodeHandle nh;
   const ros::NodeHandle pnh("~");

@@ -2,6 +2,7 @@
 
 #include "calipso_ros/mode.hpp"
 #include "calipso_ros/node_main.hpp"
+#include "calipso_scene/memory.hpp"
 #include "ros/guarded_main.hpp"
 #include "ros/recorder.hpp"
 
@@ -22,6 +23,7 @@ calipso::bag::Recorder::Params loadParams(const ros::NodeHandle& pnh) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  calipso::keepFreedMemory();
   ros::init(argc, argv, "recorder");
   ros::NodeHandle nh;
   const ros::NodeHandle pnh("~");

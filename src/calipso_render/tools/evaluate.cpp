@@ -5,8 +5,8 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <string>
 
-#include "calipso_render/memory.hpp"
 #include "calipso_scene/help.hpp"
+#include "calipso_scene/memory.hpp"
 #include "evaluation.hpp"
 
 constexpr char kUsage[] =
@@ -34,7 +34,7 @@ int main(int argc, char** argv) {
   calipso::helpIfAsked(argc, argv, kUsage);
   cv::utils::logging::setLogLevel(
       cv::utils::logging::LOG_LEVEL_SILENT);  // masks of resting objects exist once only
-  calipso::render::keepFreedMemory();
+  calipso::keepFreedMemory();
   calipso::render::EvaluationOptions options;
   int first = 1;
   for (; first < argc && std::strncmp(argv[first], "--", 2) == 0; ++first) {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "../picture_file.hpp"
-#include "calipso_render/memory.hpp"
 #include "calipso_scene/help.hpp"
+#include "calipso_scene/memory.hpp"
 #include "drawing_case.hpp"
 #include "filling_case.hpp"
 #include "mesh_drawing.hpp"
@@ -133,7 +133,7 @@ int main(int argc, char** argv) {
   calipso::helpIfAsked(argc, argv, kUsage);
   cv::utils::logging::setLogLevel(
       cv::utils::logging::LOG_LEVEL_SILENT);  // masks of resting objects exist once only
-  keepFreedMemory();
+  calipso::keepFreedMemory();
   Options options;
   for (int i = 1; i < argc; ++i) {
     const bool has_value = i + 1 < argc;
