@@ -231,6 +231,17 @@ TEST_F(UmbraOfRoom, FollowsFromTheSharedOneOnWallsThatShowNoShade) {
   expectUmbra(surfaces.umbra({}, false, shared, light, plate), {wall, wall, wall}, {25, 20});
 }
 
+// Under a sky without a sun all is left, whatever makes walls darker.
+TEST_F(UmbraOfRoom, IsAllOfItOnWallsWithoutASun) {
+  light.sun = cv::Vec3f(0, 0, 0);
+  for (const float left : {0.3f, 1.0f}) {
+    std::vector<ShadedSpot> spots;
+    shade(on_wall, cv::Vec3f::all(left), spots);
+    const UmbraSurfaces surfaces(floorPlane(), relief, roomCamera());
+    expectUmbra(surfaces.umbra(spots, false, shared, light, plate), {1, 1, 1}, {25, 20});
+  }
+}
+
 // What stands before a support plane, which the depth image shows, does not tell of that.
 TEST_F(UmbraOfRoom, SharesWhatIsSeenOnSupportsAlone) {
   std::vector<ShadedSpot> spots;

@@ -260,10 +260,11 @@ cv::Mat UmbraSurfaces::umbra(const std::vector<ShadedSpot>& spots, bool seen_lit
 float UmbraSurfaces::scaleOnRelief(const std::vector<ShadedSpot>& on_relief, float shared,
                                    const Light& light) const {
   const auto seen = median(on_relief, [&](const ShadedSpot& s) -> std::optional<float> {
-    const float lit = luminance(s.lit);
-    if (lit < kDark) return std::nullopt;
+    const float lit = luminance(s.lit),
+                share = sunShare(light, relief_.receiver(s.at.x, s.at.y).normal);
+    if (lit < kDark || share <= 0.0f) return std::nullopt;
     const float left = std::clamp(luminance(s.shaded) / lit, 0.05f, 1.0f);
-    return (1.0f / left - 1.0f) / sunShare(light, relief_.receiver(s.at.x, s.at.y).normal);
+    return (1.0f / left - 1.0f) / share;
   });
   if (seen && *seen > 1.0f / kNoShadow - 1.0f) return *seen;
   const float of_planes =
