@@ -9,9 +9,15 @@ namespace calipso::render {
 int timesTooLarge(const cv::Size& size);
 
 // A picture brought down, less what of its last rows and columns makes no whole square: means, or
-// one value of each square where those may not mix.
+// the values in the squares' middles where those may not mix.
 // @param picture of any type; may be empty
 cv::Mat reducedMeans(const cv::Mat& picture, int times);
 cv::Mat reducedValues(const cv::Mat& picture, int times);
+
+// What was told in a reduced picture, each square where it was; what makes no whole square is as
+// that beside it.
+// @param whole size of the large picture
+// @param by cv::InterpolationFlags
+cv::Mat enlargedAgain(const cv::Mat& reduced, const cv::Size& whole, int times, int by);
 
 }  // namespace calipso::render

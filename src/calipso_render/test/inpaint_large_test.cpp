@@ -3,7 +3,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "calipso_render/inpaint.hpp"
+#include "fill/inpaint_at_size.hpp"
 #include "grain_pictures.hpp"
 
 namespace calipso::render {
@@ -59,6 +59,17 @@ TEST(InpaintLarge, KeepsTheGrain) {
       }
     }
   }
+}
+
+// However far pictures of 640 px drift, what they show stays as broad as it is.
+TEST(InpaintLarge, APanoramaOfSmallPicturesIsNotReduced) {
+  Boards b;
+  const InpaintResult own = inpaintAtSize(b.image, b.hole, cv::Mat(), {});
+  const auto differs = [&](const InpaintResult& filled) {
+    return cv::norm(filled.image, own.image, cv::NORM_INF) > 0.0;
+  };
+  EXPECT_FALSE(differs(inpaintAsIn({640, 360}, b.image, b.hole, cv::Mat())));
+  EXPECT_TRUE(differs(inpaint(b.image, b.hole, cv::Mat())));
 }
 
 // What is known of the place goes along: planes, surfaces, what must not be copied.

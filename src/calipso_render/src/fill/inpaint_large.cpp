@@ -7,8 +7,8 @@
 namespace calipso::render {
 namespace {
 
-// From a picture that is `times` as large, and what is known of it, to the one that is filled: there
-// lines, patterns, planes and patches have the size that they are sought with.
+// From a picture that is `times` as large, and what is known of it, to the one that is filled:
+// there lines, patterns, planes and patches have the size that they are sought with.
 class Reduction {
  public:
   Reduction(const cv::Size& large, int times)
@@ -17,9 +17,9 @@ class Reduction {
         small_((large.width + times - 1) / times, (large.height + times - 1) / times) {}
 
   // Means. @param picture of any type; may be empty
-  cv::Mat means(const cv::Mat& picture) const { return reduced(picture, cv::INTER_AREA); }
+  cv::Mat means(const cv::Mat& picture) const { return reducedMeans(padded(picture), times_); }
   // The values in the squares' middles.
-  cv::Mat middles(const cv::Mat& picture) const { return reduced(picture, cv::INTER_NEAREST); }
+  cv::Mat middles(const cv::Mat& picture) const { return reducedValues(padded(picture), times_); }
   // CV_8UC1: 255 where any pixel of a square is set.
   cv::Mat any(const cv::Mat& mask) const {
     return mask.empty() ? mask : cv::Mat(means(mask != 0) > 0);
@@ -42,13 +42,12 @@ class Reduction {
   }
 
  private:
-  cv::Mat reduced(const cv::Mat& picture, int by) const {
+  // To whole squares.
+  cv::Mat padded(const cv::Mat& picture) const {
     if (picture.empty()) return picture;
-    const cv::Size whole = small_ * times_;
-    cv::Mat padded, out;
-    cv::copyMakeBorder(picture, padded, 0, whole.height - large_.height, 0,
-                       whole.width - large_.width, cv::BORDER_REPLICATE);
-    cv::resize(padded, out, small_, 0.0, 0.0, by);
+    const cv::Size more = small_ * times_ - large_;
+    cv::Mat out;
+    cv::copyMakeBorder(picture, out, 0, more.height, 0, more.width, cv::BORDER_REPLICATE);
     return out;
   }
 
@@ -93,8 +92,13 @@ InpaintResult enlarged(const cv::Mat& image, const cv::Mat& hole, const InpaintR
 
 InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& banned,
                       const InpaintParams& params) {
+  return inpaintAsIn(image.size(), image, hole, banned, params);
+}
+
+InpaintResult inpaintAsIn(const cv::Size& picture, const cv::Mat& image, const cv::Mat& hole,
+                          const cv::Mat& banned, const InpaintParams& params) {
   CV_Assert(image.type() == CV_32FC3 && hole.type() == CV_8UC1 && image.size() == hole.size());
-  const int times = timesTooLarge(image.size());
+  const int times = timesTooLarge(picture);
   if (times == 1) return inpaintAtSize(image, hole, banned, params);
   const Reduction reduction(image.size(), times);
   return enlarged(image, hole,

@@ -239,15 +239,6 @@ Drift driftOf(const std::vector<DriftPicture>& pictures, const cv::Mat& ground) 
   return {};
 }
 
-// A mask of a reduced picture, for the whole one.
-cv::Mat enlarged(const cv::Mat& mask, const cv::Size& whole, int times) {
-  cv::Mat out;
-  cv::resize(mask, out, mask.size() * times, 0.0, 0.0, cv::INTER_NEAREST);
-  cv::copyMakeBorder(out, out, 0, whole.height - out.rows, 0, whole.width - out.cols,
-                     cv::BORDER_REPLICATE);
-  return out;
-}
-
 }  // namespace
 
 cv::Mat displaced(const cv::Mat& image, const cv::Point2f& by, const cv::Size& out) {
@@ -275,7 +266,7 @@ Drift findDrift(const std::vector<ClipFrame>& frames, const std::vector<cv::Mat>
   Drift drift = driftOf(picturesOf(frames, covered, times), reducedValues(ground, times));
   if (times == 1 || drift.where.empty()) return drift;
   const std::vector<cv::Point2f> about = drift.shifts;
-  drift.where = enlarged(drift.where, frames.front().bgr.size(), times);
+  drift.where = enlargedAgain(drift.where, frames.front().bgr.size(), times, cv::INTER_NEAREST);
   drift.shifts =
       registered(picturesOf(frames, covered, 1), offBorders(drift.where, times * kOff),
                  [&](std::size_t i, const auto&) { return about[i] * static_cast<float>(times); });

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
-#include "calipso_render/inpaint.hpp"
+#include "fill/inpaint_at_size.hpp"
 #include "place/drift_search.hpp"
 #include "place/key_cover.hpp"
 #include "place/place_samples.hpp"
@@ -18,7 +18,7 @@ constexpr int kInterpolated = 2;  // px around a place that its value hangs on
 // px beside both what covers and what rests, of which nobody knows whether it drifts: the search
 // looks at cells, and less near to what covers
 constexpr int kUntold = 8;
-constexpr int kMatched = 16;      // px of the squares in which frame and plate are compared
+constexpr int kMatched = 16;  // px of the squares in which frame and plate are compared
 constexpr float kMostOff =
     0.1f;  // of the plate's brightness; what is off by more is something else
 constexpr double kMostArea = 4.0;  // times the picture that a panorama may have
@@ -100,7 +100,8 @@ void DriftingBackground::layOver(const std::vector<ClipFrame>& frames,
 }
 
 void DriftingBackground::invent() {
-  if (cv::countNonZero(invented_) > 0) panorama_ = inpaint(panorama_, invented_, cv::Mat()).image;
+  if (cv::countNonZero(invented_) > 0)
+    panorama_ = inpaintAsIn(where_.size(), panorama_, invented_, cv::Mat()).image;
   panorama_ = linearFromRealCodes(panorama_);
 }
 

@@ -201,12 +201,11 @@ class Surfaces {
 CastersShade unseenCastersShade(const cv::Mat& told, const cv::Mat& plate, const cv::Mat& surface) {
   const int times = told.empty() ? 1 : timesTooLarge(told.size());
   if (times > 1) {
-    CastersShade shade = unseenCastersShade(reducedValues(told, times), reducedMeans(plate, times),
-                                            reducedValues(surface, times));
+    const CastersShade shade = unseenCastersShade(
+        reducedValues(told, times), reducedMeans(plate, times), reducedValues(surface, times));
     if (shade.hidden.empty()) return {};
-    cv::resize(shade.hidden, shade.hidden, told.size(), 0.0, 0.0, cv::INTER_LINEAR);
-    cv::resize(shade.known, shade.known, told.size(), 0.0, 0.0, cv::INTER_NEAREST);
-    return shade;
+    return {enlargedAgain(shade.hidden, told.size(), times, cv::INTER_LINEAR),
+            enlargedAgain(shade.known, told.size(), times, cv::INTER_NEAREST)};
   }
   if (told.empty() || cv::countNonZero(clearly(told, kNoSun, kSun)) < kFewest) return {};
   return Surfaces(told, plate, surface).find();
