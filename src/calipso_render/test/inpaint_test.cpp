@@ -92,8 +92,8 @@ TEST(PatchOrigins, ComeFromWhereTheGroundIsAboutAsNear) {
   }
 }
 
-// A board on a floor that is darker, by much or little, and as dark a spot at the hole's rim: what is
-// around the hole is the board, so nothing comes from the floor.
+// A board on a floor that is darker, by much or little, and as dark a spot at the hole's rim: what
+// is around the hole is the board, so nothing comes from the floor.
 TEST(PatchOrigins, ComeFromWhatHasTheColourAroundTheHole) {
   constexpr int kFloor = 112;  // its first row
   struct Case {
@@ -215,6 +215,19 @@ TEST(PatchOrigins, HaveNoneWhereNoPatchIsWhole) {
                 source = cv::Mat::zeros(40, 40, CV_8U);
   const cv::Mat origin = patchOrigins(image, hole, source, {}, {});
   EXPECT_EQ(cv::countNonZero(origin.reshape(1) != -1), 0);
+}
+
+// Also in pictures halved so often that some of the last pixels see nothing of what is known.
+TEST(PushPull, CarriesTheOnlyColourEverywhere) {
+  for (const int side : {2, 16, 20, 64, 100}) {
+    cv::Mat image = cv::Mat::zeros(side / 2, side, CV_32FC3),
+            weight = cv::Mat::zeros(image.size(), CV_32F);
+    image.col(side - 1).setTo(cv::Scalar::all(100.0)), weight.col(side - 1).setTo(1.0f);
+    const cv::Mat wanted(image.size(), CV_32FC3, cv::Scalar::all(100.0));
+    EXPECT_LT(cv::norm(pushPull(image, weight), wanted, cv::NORM_INF), 1e-3) << side;
+    weight.setTo(0.0f);  // nothing to carry
+    EXPECT_TRUE(cv::checkRange(pushPull(image, weight))) << side;
+  }
 }
 
 TEST(Inpaint, ContinuesWhatRepeatsItself) {

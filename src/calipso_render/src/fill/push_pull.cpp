@@ -6,6 +6,8 @@
 namespace calipso::render {
 namespace {
 
+constexpr float kLeastSupport = 1e-6f;  // sum of weights from which a colour is known
+
 // A picture times its weight, which is the last channel.
 template <int kChannels>
 cv::Mat weighted(const cv::Mat& image, const cv::Mat& weight) {
@@ -34,16 +36,24 @@ void unweight(const cv::Mat& weighted, cv::Mat& image, cv::Mat& trust) {
     float *colour = image.ptr<float>(v), *w = trust.ptr<float>(v);
     for (int u = 0; u < image.cols; ++u, colour += kChannels, from += kChannels + 1) {
       const float sum = from[kChannels];
-      const float scale = sum > 1e-6f ? 1.0f / sum : 0.0f;
+      const float scale = sum > kLeastSupport ? 1.0f / sum : 0.0f;
       for (int c = 0; c < kChannels; ++c) colour[c] = scale * from[c];
       w[u] = std::min(4.0f * sum, 1.0f);
     }
   }
 }
 
+// The last level. What nothing supports there is as the rest, else it would be black.
+cv::Mat coarsest(const cv::Mat& image, const cv::Mat& weight) {
+  cv::Mat out = image.clone();
+  const cv::Mat supported = weight > 4.0f * kLeastSupport;
+  if (cv::countNonZero(supported) > 0) out.setTo(cv::mean(image, supported), supported == 0);
+  return out;
+}
+
 template <int kChannels>
 cv::Mat filled(const cv::Mat& image, const cv::Mat& weight) {
-  if (image.cols <= 2 && image.rows <= 2) return image.clone();
+  if (image.cols <= 2 && image.rows <= 2) return coarsest(image, weight);
   cv::Mat half, half_image, half_trust, coarse;
   cv::pyrDown(weighted<kChannels>(image, weight), half,
               {(image.cols + 1) / 2, (image.rows + 1) / 2}, cv::BORDER_REPLICATE);
