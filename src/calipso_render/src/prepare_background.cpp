@@ -310,6 +310,21 @@ void findDrifting(const std::vector<ClipFrame>& frames, const cv::Mat& ground,
   }
 }
 
+// What guides filling. @param ground as of groundNearness()
+InpaintParams knownOfPlace(const PlaceSurfaces& surfaces, const cv::Mat& ground,
+                           const RenderParams& params, const Prepared& p) {
+  InpaintParams known;
+  known.nearness = ground;
+  known.surface = surfaces.alike, known.supports = surfaces.supports;
+  known.sky = surfaces.sky;
+  known.sure = mirrorsSharply(p.mirror) ? surfaces.sureOffSupports() : surfaces.sure;
+  const std::vector<PicturePlane> planes =
+      surfaces.empty() ? inPicture(params.planes, p.camera) : surfaces.planes;
+  for (const PicturePlane& plane : planes) known.planes.push_back(plane.fromPixels(p.camera));
+  if (surfaces.empty()) known.supports = static_cast<int>(planes.size());
+  return known;
+}
+
 // Invents what is hidden: insides of bowls by what goes round in them, the rest by what is around.
 void inventPlace(const cv::Mat& traces, const ClipFrame& key, const InpaintParams& known,
                  const PlaceSurfaces& surfaces, const RenderParams& params, Prepared& p) {
@@ -360,17 +375,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   const cv::Mat ground = groundNearness(params.planes, key.camera, p.scenery);
   if (p.mirror.established())
     takeOffMirrored((ground > 0.0f) & (place.off_planes == 0), traces, key, p);
-  InpaintParams known_of_place;
-  known_of_place.nearness = ground;
-  known_of_place.surface = surfaces.alike, known_of_place.supports = surfaces.supports;
-  known_of_place.sky = surfaces.sky;
-  known_of_place.sure = mirrorsSharply(p.mirror) ? surfaces.sureOffSupports() : surfaces.sure;
-  const std::vector<PicturePlane> planes =
-      surfaces.empty() ? inPicture(params.planes, key.camera) : surfaces.planes;
-  for (const PicturePlane& plane : planes)
-    known_of_place.planes.push_back(plane.fromPixels(key.camera));
-  if (surfaces.empty()) known_of_place.supports = static_cast<int>(planes.size());
-  inventPlace(traces, key, known_of_place, surfaces, params, p);
+  inventPlace(traces, key, knownOfPlace(surfaces, ground, params, p), surfaces, params, p);
   if (!p.background.live.empty())
     p.background.passing = PassingThings(e.frames, params.background.mask_margin_px);
   if (e.camera_moves && !p.scenery.empty())
