@@ -248,6 +248,23 @@ TEST(BridgeLines, LeaveLinesOfDifferentColour) {
   EXPECT_EQ(cv::countNonZero(l.bridge().drawn), 0);
 }
 
+// A wall's top before trees.
+TEST(BridgeLines, ConnectAThingsEdgeBeforeTexture) {
+  Lines l;
+  cv::Mat texture = l.image.rowRange(0, 100);
+  texture = 0.8 * grain(320, 100);
+  cv::GaussianBlur(texture, texture, {}, 1.0);
+  cv::multiply(texture - cv::Scalar::all(96.0), cv::Scalar::all(2.5), texture);
+  texture += cv::Scalar::all(80.0);
+  l.image.rowRange(100, 200) += cv::Scalar::all(50.0);
+  const LineBridges b = l.bridge();
+  for (int u = 112; u < 208; ++u) {
+    ASSERT_NE(b.core.at<std::uint8_t>(100, u), 0) << u;
+    EXPECT_GT(l.image.at<cv::Vec3f>(101, u)[1], 180.0f) << u;
+    EXPECT_LT(l.image.at<cv::Vec3f>(98, u)[1], 180.0f) << u;
+  }
+}
+
 TEST(BridgeLines, LeaveTextureOfManyLines) {
   Lines l;
   for (int v = 4; v < 200; v += 9) l.line({0, v}, {319, v}, 60);
@@ -294,6 +311,26 @@ TEST(BridgeBorders, TellWhereTheSurfacesMeet) {
     EXPECT_EQ(place.surface.at<std::uint8_t>(102, u), 1) << u;
   }
   EXPECT_EQ(place.surface.at<std::uint8_t>(97, 100), 2);  // beside the hole, too
+}
+
+// A coping that lies almost in the plane of the wall below it: labels of both.
+TEST(BridgeBorders, LieWhereTheyAreSeenThoughLabelsWaverBesideTheHole) {
+  Lines l;
+  l.image.rowRange(100, 200) -= cv::Scalar::all(90.0);
+  cv::Mat surface(l.image.size(), CV_8U, cv::Scalar(InpaintParams::kNoPlane));
+  surface.rowRange(100, 200) = 1, surface(cv::Rect(110, 96, 100, 4)) = 1;
+  for (int v = 80; v < 100; ++v) {
+    for (int u = 210; u < 320; u += 1 + v % 2) surface.at<std::uint8_t>(v, u) = 1;
+  }
+  l.hole(cv::Rect(110, 50, 100, 100)).setTo(255);
+  l.image.setTo(cv::Scalar::all(0), l.hole);
+  const LineBridges b =
+      bridgeBorders(straightEdges(l.hole == 0, l.image), l.hole, l.hole == 0, surface, l.image);
+  for (int u = 112; u < 208; ++u) {
+    EXPECT_NE(b.core.at<std::uint8_t>(99, u) & b.core.at<std::uint8_t>(100, u), 0) << u;
+    EXPECT_EQ(surface.at<std::uint8_t>(98, u), InpaintParams::kNoPlane) << u;
+    EXPECT_EQ(surface.at<std::uint8_t>(101, u), 1) << u;
+  }
 }
 
 TEST(BridgeBorders, LeaveEdgesWithinASurface) {

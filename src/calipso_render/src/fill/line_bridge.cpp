@@ -19,25 +19,28 @@ namespace {
 
 // code values across a thin line that ends at another one
 constexpr float kAloneContrast = 30.0f;
-constexpr float kAsStrong = 0.5f;    // part of its contrast that the other one has at least
-constexpr float kAlike = 0.4f;       // difference of colours across, to their contrast
-constexpr float kHidden = 0.7f;      // part of a connection that is not seen
-constexpr float kSeenPart = 0.1f;    // of it, that is seen of either line at least,
-constexpr float kSeenAmid = 0.15f;   // and amid others, as blades of grass are
-constexpr float kBesideLine = 3.0f;  // px by which its pieces may miss it
-constexpr float kAmid = 25.0f;       // px around a line's end,
-constexpr int kOthers = 3;           // and how many others end there
-constexpr float kLongest = 40.0f;    // px of a line that are mirrored
-constexpr float kCore = 1.5f;        // px on either side that are the line itself
-constexpr float kAlone = 1.0f;       // the same of one that passes before different things
+constexpr float kAsStrong = 0.5f;       // part of its contrast that the other one has at least
+constexpr float kAlike = 0.4f;          // difference of colours across, to their contrast
+constexpr float kHidden = 0.7f;         // part of a connection that is not seen
+constexpr float kSeenPart = 0.1f;       // of it, that is seen of either line at least,
+constexpr float kSeenAmid = 0.15f;      // and amid others, as blades of grass are
+constexpr float kSeenOnOneSide = 0.3f;  // of the longer where its other side is texture
+constexpr float kBesideLine = 3.0f;     // px by which its pieces may miss it
+constexpr float kAmid = 25.0f;          // px around a line's end,
+constexpr int kOthers = 3;              // and how many others end there
+constexpr float kLongest = 40.0f;       // px of a line that are mirrored
+constexpr float kCore = 1.5f;           // px on either side that are the line itself
+constexpr float kAlone = 1.0f;          // the same of one that passes before different things
 constexpr LineBand kOwn{kLineHalf, kLineHalf};  // of a line by itself
 constexpr float kCrossFade = 4.0f;              // px on either side of the middle
+constexpr float kMoved = 0.05f;                 // cost of a px beside it
 constexpr int kBesideEnd = 3;  // px by which a border's end may have been found beside it
 
 struct Bridge {
   const LineEnd *from, *to;  // to: nothing if it ends at another bridge
   float gap, cost;
   LineBand band;
+  std::optional<SurfaceBorder> border = std::nullopt;  // if it is one
 
   bool isAlone() const { return band.left == kAlone; }
 };
@@ -56,6 +59,11 @@ class Bridger {
   LineBridges run(const std::vector<cv::Vec4f>& edges, const Lattice* lattice) {
     edges_ = edges;
     ends_ = findLineEnds(edges, hole_, source_, image_);
+    const auto clear = std::stable_partition(ends_.begin(), ends_.end(),
+                                             [](const LineEnd& end) { return end.isClear(); });
+    std::vector<LineEnd> more;
+    if (lattice == nullptr) more.assign(clear, ends_.end());
+    ends_.erase(clear, ends_.end());
     if (lattice != nullptr) {
       ends_.erase(std::remove_if(
                       ends_.begin(), ends_.end(),
@@ -63,7 +71,8 @@ class Bridger {
                   ends_.end());
     }
     const std::vector<LineEnd> joints = jointsOf(ends_, hole_, source_, image_);
-    std::vector<Bridge> bridges = connections(joints, &Bridger::connection);
+    more.insert(more.end(), joints.begin(), joints.end());
+    std::vector<Bridge> bridges = connections(more, &Bridger::connection);
     for (Bridge& b : bridges) {
       if (!b.isAlone()) b.band = bandAlong(*b.from, *b.to, source_, image_);
     }
@@ -83,15 +92,12 @@ class Bridger {
 
   // @param surface as bridgeBorders()'s
   LineBridges runBorders(const std::vector<cv::Vec4f>& edges, cv::Mat& surface) {
-    ends_ = withBeside(findLineEnds(edges, hole_, source_, image_, false), kBesideEnd, hole_,
-                       source_, image_);
+    ends_ = findLineEnds(edges, hole_, source_, image_, true);
+    beside_ = withBeside(ends_, kBesideEnd, hole_, source_, image_);
     std::vector<Bridge> borders = connections({}, &Bridger::border);
     sortByStrength(borders);
     drawAll(borders);
-    for (const Bridge& b : borders) {
-      if (const auto border = borderAlong(*b.from, *b.to, surface_))
-        setSides(*border, *b.from, *b.to, hole_, surface);
-    }
+    for (const Bridge& b : borders) setSides(*b.border, *b.from, *b.to, hole_, surface);
     return result_;
   }
 
@@ -125,6 +131,7 @@ class Bridger {
   // @return nothing if b does not continue a
   std::optional<Bridge> connection(const LineEnd& a, const LineEnd& b, float gap) const {
     if (!areInLine(a, b, gap) || isByChance(a, b, gap)) return std::nullopt;
+    if (!a.isClear() || !b.isClear()) return connectionOnOneSide(a, b, gap);
     if (!a.is_joint && !b.is_joint && besideAlike(a, b)) {
       if (const auto cost = misfit(a, b, gap, differenceAcross(a, b)))
         return Bridge{&a, &b, gap, *cost, kOwn};
@@ -135,25 +142,53 @@ class Bridger {
                  : std::nullopt;
   }
 
-  // Of two surfaces: one side of them is alike.
-  std::optional<Bridge> border(const LineEnd& a, const LineEnd& b, float gap) const {
-    if (!areInLine(a, b, gap)) return std::nullopt;
-    const auto cost = misfit(a, b, gap, differenceOfSides(a, b));
-    if (!cost) return std::nullopt;
-    return borderAlong(a, b, surface_) ? std::optional<Bridge>({&a, &b, gap, *cost, kOwn})
-                                       : std::nullopt;
+  // Of a thing's edge before texture: the thing is alike.
+  std::optional<Bridge> connectionOnOneSide(const LineEnd& a, const LineEnd& b, float gap) const {
+    if (std::min(a.contrast, b.contrast) < kAloneContrast || a.from_afar || b.from_afar ||
+        std::max(seenLength(a), seenLength(b)) < kSeenOnOneSide * gap)
+      return std::nullopt;
+    std::optional<Bridge> best;
+    for (const int side : {0, 1}) {
+      if (!standOut(a, b, side) || !besideAlike(a, b, side)) continue;
+      const auto cost = misfit(a, b, gap, differenceOfSide(a, b, side));
+      if (cost && (!best || 2.0f + *cost < best->cost))
+        best = Bridge{&a, &b, gap, 2.0f + *cost, kOwn};
+    }
+    return best;
+  }
+
+  // Of two surfaces: one side of them is alike. Labels tell that they meet along here, a few pixels
+  // off, colours where.
+  std::optional<Bridge> border(const LineEnd& a, const LineEnd& b, float) const {
+    std::optional<Bridge> best;
+    std::optional<SurfaceBorder> surfaces;
+    for (const LineEnd& from : beside_[a.line]) {
+      for (const LineEnd& to : beside_[b.line]) {
+        const float gap = static_cast<float>(cv::norm(to.at - from.at));
+        if (!areInLine(from, to, gap)) continue;
+        const float difference =
+            std::min(differenceOfSide(from, to, 0), differenceOfSide(from, to, 1));
+        auto cost = misfit(from, to, gap, difference);
+        if (!cost) continue;
+        *cost += kMoved * (from.aside + to.aside);
+        if (!surfaces) surfaces = borderAlong(from, to, surface_);
+        if (!best || *cost < best->cost) best = Bridge{&from, &to, gap, *cost, kOwn};
+      }
+    }
+    if (best) best->border = surfaces;
+    return surfaces ? best : std::nullopt;
   }
 
   // Ends that continue each other, the best first, each once, none across another.
-  // @param joints more of them; what is returned points into it
+  // @param more of them; what is returned points into it
   // @param connect connection() or border()
-  std::vector<Bridge> connections(const std::vector<LineEnd>& joints,
+  std::vector<Bridge> connections(const std::vector<LineEnd>& more,
                                   std::optional<Bridge> (Bridger::*connect)(const LineEnd&,
                                                                             const LineEnd&, float)
                                       const) const {
     std::vector<const LineEnd*> ends;
     for (const LineEnd& end : ends_) ends.push_back(&end);
-    for (const LineEnd& joint : joints) ends.push_back(&joint);
+    for (const LineEnd& end : more) ends.push_back(&end);
     std::vector<std::vector<Bridge>> from(ends.size());
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t i = 0; i < ends.size(); ++i) {
@@ -216,9 +251,9 @@ class Bridger {
         return end.into.dot(p - end.at) < kLineStray;
       };
       if (aside(a) <= kBesideLine && aside(b) <= kBesideLine && behind(a) && behind(b))
-        sum += 0.5f * std::abs(end.into.dot(b - a));  // each has two sides
+        sum += std::abs(end.into.dot(b - a));
     }
-    return std::max(end.length, sum);
+    return std::max(end.length, end.isThin() ? 0.5f * sum : sum);  // a line has two edges
   }
 
   // How badly b, in line with a, continues it; nothing if it does not.
@@ -343,6 +378,7 @@ class Bridger {
   cv::Mat& image_;
   std::vector<cv::Vec4f> edges_;
   std::vector<LineEnd> ends_;
+  std::vector<std::vector<LineEnd>> beside_;  // of each end, where a border may have it
   LineBridges result_;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "calipso_render/inpaint.hpp"
@@ -35,13 +36,13 @@ constexpr float kStray = 1.5f;      // px by which ends may miss each other,
 // change of colours along a line, to their contrast, from which it is another
 constexpr float kSame = 0.2f;
 constexpr float kAgain = 0.25f;  // mean difference, to the contrast, of a line that is seen again
+constexpr float kOnEdge = 0.3f;  // part of the contrast that is within a px of an edge
 constexpr float kThin = 0.35f;   // both sides differ by no more than this part of the contrast
 
 class LineEndFinder {
  public:
-  LineEndFinder(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& image,
-                bool only_clear = true)
-      : hole_(hole), source_(source), image_(image), only_clear_(only_clear) {}
+  LineEndFinder(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& image, bool any = false)
+      : hole_(hole), source_(source), image_(image), any_(any) {}
 
   std::vector<LineEnd> run(const std::vector<cv::Vec4f>& edges) {
     const cv::Rect near = windowAround(hole_, cvCeil(kClear), cvCeil(kClear));
@@ -73,7 +74,7 @@ class LineEndFinder {
     for (int i = 1; i <= pieces; ++i) {
       LineEnd end{
           from + static_cast<float>(i * kLast) * into, into, 1.0f * kLast, {}, 0.0f, {}, false};
-      if (isSet(source_, end.at) && measure(end) && standsOut(end) && end.isThin())
+      if (isSet(source_, end.at) && measure(end) && standsOut(end) && end.isClear() && end.isThin())
         ++found, sum += end.contrast;
     }
     return 2 * found > pieces ? sum / static_cast<float>(found) : 0.0f;
@@ -82,16 +83,21 @@ class LineEndFinder {
   // An edge of a line between two things, in its middle; nothing if there is none.
   std::optional<LineEnd> joint(LineEnd end) const {
     end.is_joint = true;
-    return partsThings(end) && centre(end) && partsThings(end) ? std::optional<LineEnd>(end)
-                                                               : std::nullopt;
+    const bool found = partsThings(end) && centre(end) && partsThings(end);
+    return found ? std::optional<LineEnd>(end) : std::nullopt;
   }
 
   std::optional<LineEnd> moved(LineEnd end, float aside) const {
-    end.at += aside * leftOf(end.into);
-    return isSet(source_, end.at) && measure(end) ? std::optional<LineEnd>(end) : std::nullopt;
+    end.at += aside * leftOf(end.into), end.aside = std::abs(aside);
+    const bool found = isSet(source_, end.at) && measure(end) && isOnEdge(end);
+    return found ? std::optional<LineEnd>(end) : std::nullopt;
   }
 
  private:
+  static bool isOnEdge(const LineEnd& end) {
+    return rms(end.profile[kLineHalf + 1] - end.profile[kLineHalf - 1]) > kOnEdge * end.contrast;
+  }
+
   // Either side differs from the mean of both by less than the line does.
   static bool partsThings(const LineEnd& end) {
     return !end.isThin() && 0.5f * rms(end.beside[0] - end.beside[1]) < kLineItself * end.contrast;
@@ -106,7 +112,8 @@ class LineEndFinder {
              std::abs(render::cross(a.into, apart)) < kStray;
     };
     std::stable_sort(ends_.begin(), ends_.end(), [](const LineEnd& a, const LineEnd& b) {
-      return std::make_pair(a.from_afar, -a.length) < std::make_pair(b.from_afar, -b.length);
+      return std::make_tuple(a.from_afar, !a.isClear(), -a.length) <
+             std::make_tuple(b.from_afar, !b.isClear(), -b.length);
     });
     std::vector<LineEnd> kept;
     for (const LineEnd& end : ends_) {
@@ -130,13 +137,16 @@ class LineEndFinder {
         away.at<float>(before) < kClear)
       return std::nullopt;
     float reach = toHole(to, into);
+    std::optional<LineEnd> on_one_side;
     // Where the hole runs beside it the line is measured farther back.
     for (const float nearest = std::min(reach, kLost); reach <= kFarthest && length >= kShortest;
          reach += kStepBack, length -= kStepBack, to -= kStepBack * into) {
       LineEnd end{to, into, length, {}, 0.0f, {}, reach > nearest};
-      if (measure(end) && standsOut(end) && centre(end)) return end;
+      if (!measure(end) || !standsOut(end) || !centre(end)) continue;
+      if (end.isClear() || any_) return end;
+      if (!on_one_side) on_one_side = end;
     }
-    return std::nullopt;
+    return on_one_side;
   }
 
   // px to the hole; if it is too far, those that are seen on a way most of which is not; else more
@@ -163,7 +173,8 @@ class LineEndFinder {
       if (!near) return true;
       if (far && end.length > 2 * kLast) end.into = (*near - *far) / cv::norm(*near - *far);
       end.at = *near + 0.5f * (kFirst + kLast) * end.into;
-      if (!measure(end) || !standsOut(end)) return false;
+      const bool was_clear = end.isClear() && !any_;
+      if (!measure(end) || !standsOut(end) || (was_clear && !end.isClear())) return false;
     }
     return true;
   }
@@ -224,7 +235,7 @@ class LineEndFinder {
     return end.length;
   }
 
-  // A line among many like it is texture.
+  // A line among many like it is texture; a thing's edge may have texture on its other side.
   bool standsOut(LineEnd& end) const {
     for (const int side : {0, 1}) {
       cv::Vec3f sum;
@@ -239,21 +250,21 @@ class LineEndFinder {
           sum += c, squares += c.dot(c), ++count;
         }
       }
+      end.stands_out[side] = false;
       if (4 * count < (kBesideLast - kBesideFirst) * (kLast - kFirst)) {
-        if (only_clear_) return false;
         end.beside[side] = end.profile[side == 0 ? 0 : 2 * kLineHalf];
         continue;
       }
       end.beside[side] = sum / count;
       const float deviation = std::sqrt(
           std::max(0.0f, squares / count - end.beside[side].dot(end.beside[side])) / 3.0f);
-      if (only_clear_ && end.contrast < kStandsOut * deviation) return false;
+      end.stands_out[side] = end.contrast >= kStandsOut * deviation;
     }
-    return true;
+    return any_ || end.stands_out[0] || end.stands_out[1];
   }
 
   const cv::Mat &hole_, &source_, &image_;
-  bool only_clear_;
+  bool any_;
   std::vector<LineEnd> ends_;
 };
 
@@ -272,8 +283,8 @@ std::vector<cv::Vec4f> straightEdges(const cv::Mat& source, const cv::Mat& image
 }
 
 std::vector<LineEnd> findLineEnds(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole,
-                                  const cv::Mat& source, const cv::Mat& image, bool only_clear) {
-  return LineEndFinder(hole, source, image, only_clear).run(edges);
+                                  const cv::Mat& source, const cv::Mat& image, bool any) {
+  return LineEndFinder(hole, source, image, any).run(edges);
 }
 
 std::vector<LineEnd> jointsOf(const std::vector<LineEnd>& ends, const cv::Mat& hole,
@@ -286,20 +297,20 @@ std::vector<LineEnd> jointsOf(const std::vector<LineEnd>& ends, const cv::Mat& h
   return joints;
 }
 
-std::vector<LineEnd> withBeside(const std::vector<LineEnd>& ends, int reach, const cv::Mat& hole,
-                                const cv::Mat& source, const cv::Mat& image) {
+std::vector<std::vector<LineEnd>> withBeside(const std::vector<LineEnd>& ends, int reach,
+                                             const cv::Mat& hole, const cv::Mat& source,
+                                             const cv::Mat& image) {
   const LineEndFinder finder(hole, source, image);
-  std::vector<std::vector<LineEnd>> moved(ends.size());
+  std::vector<std::vector<LineEnd>> all(ends.size());
 #pragma omp parallel for schedule(dynamic, 8)
   for (std::size_t i = 0; i < ends.size(); ++i) {
+    all[i].push_back(ends[i]);
     for (int aside = -reach; aside <= reach; ++aside) {
       const auto beside =
           aside != 0 ? finder.moved(ends[i], static_cast<float>(aside)) : std::nullopt;
-      if (beside) moved[i].push_back(*beside);
+      if (beside) all[i].push_back(*beside);
     }
   }
-  std::vector<LineEnd> all = ends;
-  for (const std::vector<LineEnd>& m : moved) all.insert(all.end(), m.begin(), m.end());
   return all;
 }
 

@@ -35,8 +35,16 @@ bool areInLine(const LineEnd& a, const LineEnd& b, float gap) {
 }
 
 bool besideAlike(const LineEnd& a, const LineEnd& b) {
-  const float most = kBesideAlike * std::min(a.contrast, b.contrast);
-  return rms(a.beside[0] - b.beside[1]) <= most && rms(a.beside[1] - b.beside[0]) <= most;
+  return besideAlike(a, b, 0) && besideAlike(a, b, 1);
+}
+
+bool besideAlike(const LineEnd& a, const LineEnd& b, int side) {
+  return rms(a.beside[side] - b.beside[1 - side]) <=
+         kBesideAlike * std::min(a.contrast, b.contrast);
+}
+
+bool standOut(const LineEnd& a, const LineEnd& b, int side) {
+  return a.stands_out[side] && b.stands_out[1 - side];
 }
 
 float differenceAcross(const LineEnd& a, const LineEnd& b) {
@@ -50,11 +58,10 @@ float differenceAlone(const LineEnd& a, const LineEnd& b) {
   return rms(sum / 3.0f) / std::max(a.contrast, b.contrast);
 }
 
-float differenceOfSides(const LineEnd& a, const LineEnd& b) {
+float differenceOfSide(const LineEnd& a, const LineEnd& b, int side) {
   constexpr int kCount = kLineHalf + 1;
-  const float least =
-      std::min(squaresAcross(a, b, 0, kCount), squaresAcross(a, b, kLineHalf, kCount));
-  return std::sqrt(least / kCount) / std::min(a.contrast, b.contrast);
+  const float squares = squaresAcross(a, b, side * kLineHalf, kCount);
+  return std::sqrt(squares / kCount) / std::min(a.contrast, b.contrast);
 }
 
 }  // namespace calipso::render

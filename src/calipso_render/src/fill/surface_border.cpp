@@ -39,11 +39,12 @@ bool isBeside(const Way& way, const cv::Point2f& aside, int own, float first, fl
   return parted > kParted * steps;
 }
 
-// All along, what is seen of the edge included.
+// All along where it is hidden, and where one of its ends is seen: labels of what lies almost in a
+// plane are unsure.
 bool isAllAlong(const Way& way, const cv::Point2f& aside, int own, const cv::Mat& surface) {
   return !isGuess(own) && isBeside(way, aside, own, 0.0f, way.gap, true, surface) &&
-         isBeside(way, aside, own, -way.from.length, 0.0f, false, surface) &&
-         isBeside(way, aside, own, way.gap, way.gap + way.to.length, false, surface);
+         (isBeside(way, aside, own, -way.from.length, 0.0f, false, surface) ||
+          isBeside(way, aside, own, way.gap, way.gap + way.to.length, false, surface));
 }
 
 }  // namespace
@@ -51,15 +52,15 @@ bool isAllAlong(const Way& way, const cv::Point2f& aside, int own, const cv::Mat
 std::optional<SurfaceBorder> borderAlong(const LineEnd& from, const LineEnd& to,
                                          const cv::Mat& surface) {
   const Way way{from, to};
-  const cv::Point2f before = from.at - kLineHalf * from.into;
+  const cv::Point2f seen[] = {from.at - kLineHalf * from.into, to.at - kLineHalf * to.into};
   for (const int off : {kOff, kOffOfStrip}) {
-    const float beyond = static_cast<float>(off) + 1.0f;
-    const int left = surfaceAt(surface, before + beyond * leftOf(from.into)),
-              right = surfaceAt(surface, before - beyond * leftOf(from.into));
-    if (left == 0 || right == 0 || left == right) continue;
-    const cv::Point2f aside = beyond * leftOf(way.along);
-    if (isAllAlong(way, aside, left, surface) || isAllAlong(way, -aside, right, surface))
-      return SurfaceBorder{left, right, off};
+    const cv::Point2f aside = (static_cast<float>(off) + 1.0f) * leftOf(way.along);
+    for (const cv::Point2f& p : seen) {
+      const int left = surfaceAt(surface, p + aside), right = surfaceAt(surface, p - aside);
+      if (left == 0 || right == 0 || left == right) continue;
+      if (isAllAlong(way, aside, left, surface) || isAllAlong(way, -aside, right, surface))
+        return SurfaceBorder{left, right, off};
+    }
   }
   return std::nullopt;
 }

@@ -13,9 +13,9 @@ struct SurfaceBorder {
   int off;          // px on either side of the edge from where on the labels agree with it
 };
 
-// The surfaces that an edge parts on most of its way through the hole, and of what is seen of it:
-// all along it the one, on the other side never that. What is hidden and no plane is a guess, which
-// contradicts nothing.
+// The surfaces that an edge parts on most of its way through the hole, and of what is seen of one of
+// its ends: all along it the one, on the other side never that. What is hidden and no plane is a
+// guess, which contradicts nothing. The labels of what lies almost in a plane waver.
 // @param surface CV_8UC1, InpaintParams::surface @return nothing if there are none
 std::optional<SurfaceBorder> borderAlong(const LineEnd& from, const LineEnd& to,
                                          const cv::Mat& surface);
