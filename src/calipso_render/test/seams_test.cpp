@@ -73,6 +73,29 @@ TEST(BlendSeams, KeepTheEdgeBetweenPlanes) {
     EXPECT_NEAR(blendedStep(step, planes)[60] - blendedStep(step, planes)[59], step, 1e-3f);
 }
 
+// Of one surface, as water is that mirrors darker things here and brighter ones there: the fill is 45
+// code values too bright all along the border. A single stripe that ends at it is an edge.
+TEST(BlendSeams, SpreadWhatIsMissedAllAlongASurfacesBorder) {
+  const auto blended = [](const cv::Rect& dark, const cv::Mat& planes) {
+    cv::Mat image(60, 120, CV_32FC3, cv::Scalar::all(100)), hole = cv::Mat::zeros(60, 120, CV_8U);
+    hole.colRange(40, 80).setTo(255);
+    image(dark).setTo(cv::Scalar::all(55));
+    cv::Mat origin(60, 120, CV_16SC2, {-1, -1}), row;
+    for (int v = 0; v < 60; ++v) {
+      for (int u = 40; u < 80; ++u) origin.at<cv::Vec2s>(v, u) = {100, static_cast<short>(v)};
+    }
+    blendSeams(hole, hole == 0, origin, planes, {}, image);
+    cv::extractChannel(image.row(30), row, 0);
+    return std::vector<float>(row.begin<float>(), row.end<float>());
+  };
+  const cv::Mat one(60, 120, CV_8U, cv::Scalar(1));
+  const cv::Rect all(0, 0, 40, 60), stripe(0, 29, 40, 2);
+  EXPECT_LT(blended(all, one)[40], 60.0f);
+  EXPECT_LT(blended(all, one)[45], 80.0f);
+  EXPECT_GT(blended(all, cv::Mat())[45], 90.0f);
+  EXPECT_GT(blended(stripe, one)[45], 90.0f);
+}
+
 TEST(BlendSeams, SpreadsAStepAndKeepsTheGrain) {
   // A copy of the left part, 3 code values too dark, between two parts that fit.
   const cv::Mat truth = repeated(grain(120, 30), 40);

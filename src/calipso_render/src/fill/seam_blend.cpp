@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <opencv2/core/hal/intrin.hpp>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "calipso_render/inpaint.hpp"
@@ -15,6 +16,9 @@ namespace {
 constexpr float kScreen = 0.003f;
 // code values; what misses by much more is an edge of things, not a seam to be spread
 constexpr float kEdge = 25.0f;
+// px of the square in which what misses at a surface's border with its seen part is told apart from
+// what single edges miss there
+constexpr int kAlongBorder = 9;
 constexpr float kScreenEdge = 0.3f;  // kScreen of what an edge misses
 // of successive overrelaxation: seams go on changing slowly far away, what an edge misses is
 // settled soon
@@ -47,7 +51,9 @@ class Seams {
         planes_(planes),
         sky_(sky),
         image_(image),
-        has_planes_(!planes.empty()) {}
+        has_planes_(!planes.empty()) {
+    if (has_planes_) findBorderMiss();
+  }
 
   // First one colour of a chessboard, then the other: a field's neighbours have the other one, so
   // that none waits for another of its colour.
@@ -84,11 +90,42 @@ class Seams {
       if (index.at<int>(q) >= 0 && has_planes_ && differ(planes_, p, q)) continue;
       if (index.at<int>(q) >= 0) links.neighbours[i] = index.at<int>(q);
       links.count += 1.0f;
-      const cv::Vec3f miss = colour(q) - colour(p) - wanted(p, q);
+      const cv::Vec3f miss = missOf(p, q);
+      const cv::Vec3f edge =
+          isOwnBorder(p, q) ? cv::Vec3f(miss - border_miss_.at<cv::Vec3f>(p)) : miss;
       const cv::Vec3f seam =
-          isInSky(p, q) ? miss : miss / (1.0f + miss.dot(miss) / (kEdge * kEdge));
+          isInSky(p, q) ? miss : miss / (1.0f + edge.dot(edge) / (kEdge * kEdge));
       nodes.seams[k] += widened(seam), nodes.edges[k] += widened(miss - seam);
     }
+  }
+
+  // What the fill misses on the whole where it meets what is seen of the same surface.
+  void findBorderMiss() {
+    border_miss_ = cv::Mat::zeros(hole_.size(), CV_32FC3);
+    cv::Mat count = cv::Mat::zeros(hole_.size(), CV_32F), wide;
+    for (int v = 0; v < hole_.rows; ++v) {
+      for (int u = 0; u < hole_.cols; ++u) {
+        if (hole_.at<std::uint8_t>(v, u) == 0) continue;
+        for (const cv::Point& step : kAround) {
+          const cv::Point p(u, v), q = p + step;
+          if (!isOwnBorder(p, q)) continue;
+          border_miss_.at<cv::Vec3f>(p) += missOf(p, q), count.at<float>(p) += 1.0f;
+        }
+      }
+    }
+    const cv::Size square(kAlongBorder, kAlongBorder);
+    cv::boxFilter(border_miss_, border_miss_, -1, square, {-1, -1}, false);
+    cv::boxFilter(count, count, -1, square, {-1, -1}, false);
+    cv::cvtColor(cv::max(count, 1.0f), wide, cv::COLOR_GRAY2BGR);
+    border_miss_ /= wide;
+  }
+  bool isOwnBorder(const cv::Point& p, const cv::Point& q) const {
+    return has_planes_ && isSource(q) && hole_.at<std::uint8_t>(q) == 0 &&
+           planes_.at<std::uint8_t>(p) != 0 &&
+           planes_.at<std::uint8_t>(p) == planes_.at<std::uint8_t>(q);
+  }
+  cv::Vec3f missOf(const cv::Point& p, const cv::Point& q) const {
+    return colour(q) - colour(p) - wanted(p, q);
   }
 
   bool inside(const cv::Point& p) const {
@@ -125,6 +162,7 @@ class Seams {
 
   const cv::Mat &hole_, &source_, &origin_, &planes_, &sky_, &image_;
   bool has_planes_;
+  cv::Mat border_miss_;  // CV_32FC3
 };
 
 // What is added: mismatches spread by a screened Poisson equation, all channels at once. Known
