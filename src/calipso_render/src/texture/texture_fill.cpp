@@ -11,6 +11,7 @@
 #include "smooth_step.hpp"
 #include "texture/bent_shape.hpp"
 #include "texture/colour_layers.hpp"
+#include "texture/hidden_front.hpp"
 #include "texture/like_places.hpp"
 #include "texture/like_texels.hpp"
 #include "texture/picture_trust.hpp"
@@ -35,6 +36,7 @@ constexpr float kOwnLow = 0.2f, kOwnHigh = 0.6f;
 // weight of a look at a like place that counts for nothing, and in full
 constexpr float kPoor = 0.15f, kGood = 0.45f;
 
+constexpr float kLikeEnough = 0.5f;     // certainty from which a like place tells what is hidden
 constexpr float kLikeReach = 2.0f;      // spacings of texels
 constexpr std::size_t kMostTurned = 3;  // turned places that a place takes its look from
 // texels, about, by which like places are judged; of the stock model, where that takes longer
@@ -81,6 +83,7 @@ class TextureFill {
     if (views_.size() > 1) copied_ = sharpen({views_, actors_, pictures_}, a.texture, shown_);
     makeTexels(a.texture, origins);
     if (views_.size() > 1) copyLike(a.texture, origins);
+    fillHiddenFront(a.texture, origins);
     if (views_.size() > 1) a.grain = grainOf({views_, actors_, pictures_}, a.texture);
     auto& [from, certain, layer] = origins;
     levelSeams(surface_.key_vertices, surface_.triangles, layer, a.texture);
@@ -342,6 +345,30 @@ class TextureFill {
         origins.certain[i] = 1.0f, origins.layer[i] = static_cast<signed char>(j + 1);
         origins.from[i] = kCopied;
         break;
+      }
+    }
+  }
+
+  // What another object hides in the key frame.
+  void fillHiddenFront(SurfaceTexture& texture, Origins& origins) const {
+    const std::optional<Reflectance> front =
+        hiddenFront(views_[0]->labels, surface_, sightings_.pieces(), pictures_[0]);
+    if (!front) return;
+    const std::vector<const View*> views = {views_[0]};
+    const std::vector<const Actor*> actors = {actors_[0]};
+    const std::vector<Reflectance> pictures = {*front};
+    const Sightings sightings({views, actors, pictures});
+#pragma omp parallel for schedule(dynamic, 64)
+    for (int t = 0; t < texture.triangleCount(); ++t) {
+      for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
+        const Seen& seen = looks_[t].texels[i - texture.firstOf(t)];
+        if (seen.total >= kSure) continue;
+        const Sighting look =
+            sightings.lookAt(0, keyPlaceOf(t, texture.weightsOf(t, i - texture.firstOf(t))), 1.0f);
+        if (look.weight <= 0.0f) continue;
+        const cv::Vec3f colour = colourOf(sampleBicubic(front->albedo, look.u, look.v));
+        texture.texels[i] = cv::Vec4f(colour[0], colour[1], colour[2], 0.0f);
+        origins.certain[i] = 1.0f, origins.layer[i] = 0;
       }
     }
   }

@@ -28,11 +28,12 @@ struct SeenObject {
 };
 
 // Makes the appearance's texture: every place of the surface as the pictures show it, one over the
-// other by how well they do; what they leave open, as the key frame shows places that are like it
-// by the mesh's shape (its mirror images and what is turned about an axis of revolution, in the
-// order of keepBest); then the place's own, seen at a flat angle; then the front of the object at
-// the same pixel, where the place is as if mirrored in the picture's plane. What is left continues
-// the surface's pattern (continuePattern), or the surface around it smoothly.
+// other by how well they do; what another object hides in the key frame as hiddenFront() has it;
+// what they leave open, as the key frame shows places that are like it by the mesh's shape (its
+// mirror images and what is turned about an axis of revolution, in the order of keepBest); then the
+// place's own, seen at a flat angle; then the front of the object at the same pixel, where the
+// place is as if mirrored in the picture's plane. What is left continues the surface's pattern
+// (continuePattern), or the surface around it smoothly.
 // @param a  has region and albedo
 void fillTexture(const SeenObject& object, Appearance& a);
 
